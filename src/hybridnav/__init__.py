@@ -9,8 +9,8 @@ from importlib import import_module
 
 import lazy_loader
 
-from hybridnav._base.renamed import renamed
 from hybridnav._version import __version__ as __version__
+from hybridnav.errors import renamed
 
 _named, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 

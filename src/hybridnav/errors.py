@@ -1,6 +1,7 @@
 """Errors and warnings; each message states the given value, the expected one, and the place."""
 
 import reprlib
+import warnings
 from typing import Any
 
 _MOST_SHOWN = 80
@@ -18,6 +19,11 @@ def brief(value: Any) -> str:
     except ValueError:  # Python writes no integer of more than 4300 digits
         return f"a huge {type(value).__name__}"
     return text if len(text) <= _MOST_SHOWN else f"{text[:38]}...{text[-39:]}"
+
+
+def renamed(old: str, new: str) -> None:
+    """Warn the caller of a function's caller that it has another name now."""
+    warnings.warn(f"{old} is now {new}: write that", FutureWarning, stacklevel=3)
 
 
 class HybridNavError(Exception):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import inspect
 import sys
 import warnings
+from collections.abc import Mapping
 from dataclasses import is_dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -25,9 +26,6 @@ from hybridnav.cli.common import (
 from hybridnav.cli.map_options import FloorOptions, check_options
 from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.errors import HybridNavError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _HOME_OF = {
     "plan": "plan",

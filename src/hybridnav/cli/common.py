@@ -5,21 +5,18 @@ from __future__ import annotations
 import io
 import os
 import sys
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
+from pathlib import Path
 from threading import Timer
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import hybridnav as hn
 from hybridnav._base.clock import clock
 from hybridnav._base.files import check_replaceable, printable, without_controls
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import HybridNavError, MapError, PresetError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
 
 EXIT_SOLVED = 0
 EXIT_NOT_SOLVED = 1

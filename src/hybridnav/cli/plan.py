@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import typer
 
@@ -16,9 +17,6 @@ from hybridnav.cli.query import PlanOptions, TypedQuery, checked_at
 from hybridnav.cli.reading import check_room_to_be, grow_topology, outside, refused_result
 from hybridnav.cli.rendering import draw, query_of, respond
 from hybridnav.cli.warm import compiling_beside
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Seconds = dict[str, float]
 """Seconds of each stage."""

@@ -13,14 +13,13 @@ from hybridnav._base.extension import extension
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, check_new, check_output, check_picture
 from hybridnav.cli.map_options import FloorOptions, MapOptions
-from hybridnav.cli.options import OfBuilding, OneMap, option
+from hybridnav.cli.options import Closing, Costs, OfBuilding, OneMap, option
 from hybridnav.errors import brief
 from hybridnav.guide.words import check_language, languages
 from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
     import hybridnav as hn
-    from hybridnav.cli.options import Closing, Costs
     from hybridnav.cli.rendering import Waypoint
     from hybridnav.planning.named import At
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
 from hybridnav.cli.options import closing_lines, profile_lines
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 Waypoint = str | tuple[float, ...]
 """A name, or `(x, y)` or `(x, y, yaw)` in metres and radians, map frame."""

@@ -6,16 +6,19 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.files import printable
 from hybridnav._base.trig import atan2, cos, hypot, sin
+from hybridnav._base.typing import AnyArray, FloatArray, PathLike
 from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.graphs.files.nav2 import nav2_bytes, nav2_features
@@ -27,15 +30,8 @@ from hybridnav.maps.costs.factors import mask_on_map
 from hybridnav.maps.costs.files import CostSpec, parse_costs
 from hybridnav.maps.files.ros import read_mask
 from hybridnav.planning.speed import SpeedMap
+from hybridnav.rooms import Door, Rooms
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import AnyArray, FloatArray, PathLike
-    from hybridnav.rooms import Door, Rooms
 
 MOST_ROOMS = 100
 """Largest value that map_server's mode `raw` keeps; a larger one becomes unknown."""

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.graphs.attach import PlacedGraph
 from hybridnav.graphs.gather import MOST_EXAMPLES, Finding, Findings, Point, shown
 from hybridnav.graphs.judge import FreeSpace
 from hybridnav.graphs.lanes import DoorsPassed
 from hybridnav.graphs.one_way import against
 from hybridnav.graphs.waypoint_graph import WaypointGraph, add_components
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.refine import Sight
+from hybridnav.rooms import Rooms
 from hybridnav.rooms.listing import FOUND_NAME
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.rooms import Rooms
 
 _PAIRS = 2000
 """Random free points; the share that sees a node is counted."""

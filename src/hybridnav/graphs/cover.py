@@ -5,24 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import hypots
-from hybridnav.graphs.judge import LEAST_AREA_M2, checked_position
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+from hybridnav.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.graphs.lanes import DoorsPassed
-from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM
+from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch
+from hybridnav.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps.geometry import cells_of_line
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.graphs.judge import FreeSpace
-    from hybridnav.graphs.sketch import Sketch
-    from hybridnav.graphs.waypoint_graph import RouteGraph
-    from hybridnav.refine import Sight
-    from hybridnav.rooms import Rooms
-    from hybridnav.topology import TopologicalMap
+from hybridnav.refine import Sight
+from hybridnav.rooms import Rooms
+from hybridnav.topology import TopologicalMap
 
 _NEAREST = (1, 4, 16, 64)
 """Nearest nodes by which points are looked for, one number after the other: most see the first."""

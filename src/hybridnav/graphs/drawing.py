@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import dist, hypots
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch
 from hybridnav.graphs.strands import Passage, Strand, crosses, is_beside, length_between
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav._base.typing import FloatArray, LongArray
 
 _COARSE = 8
 """Cells between the points by which the length of a chain is measured: its steps are stairs."""

@@ -5,31 +5,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
-
-from hybridnav._base.trig import dist
-from hybridnav.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-
 import re
 from array import array
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, get_args
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.files import printable
+from hybridnav._base.trig import dist
+from hybridnav._base.typing import FloatArray
+from hybridnav.errors import InvalidValueError
 from hybridnav.maps.frame import FARTHEST_M
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from hybridnav._base.typing import FloatArray
 
 Point = tuple[float, float]
 Severity = Literal["error", "warning", "note"]

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.typing import FloatArray, LongArray
+from hybridnav.graphs.judge import FreeSpace
 from hybridnav.graphs.waypoint_graph import components_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.graphs.judge import FreeSpace
 
 _TRIED = 8
 """Nearest nodes of other parts that are tried as partners of a part without connection."""

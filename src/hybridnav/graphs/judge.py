@@ -5,26 +5,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.attach import MANY_CANDIDATES, Network
 from hybridnav.graphs.orientation import Orientation
 from hybridnav.graphs.waypoint_graph import RouteGraph
+from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line, walks_clear
 from hybridnav.refine import Sight
+from hybridnav.rooms import Rooms
 from hybridnav.rooms.find import outside_of
-from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
+from hybridnav.search.mesh import MeshPaths, MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.search import rounded_into
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.rooms import Rooms
-    from hybridnav.search.mesh import MeshPaths
 
 LEAST_AREA_M2 = 1.0
 """Area in square metres below which a part of free space gets no nodes: scans have many."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from hybridnav._base.copies import frozen
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.cover import Aims, complete
 from hybridnav.graphs.drawing import ChainGraph, add_chords, drop_ends
@@ -23,20 +25,14 @@ from hybridnav.graphs.orientation import Orientation
 from hybridnav.graphs.route_messages import ids_of
 from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
 from hybridnav.graphs.strands import COVER, Layout, Passage, RoomAnchors, lines_of, strands_of
-from hybridnav.maps import CellClass
+from hybridnav.graphs.waypoint_graph import RouteGraph, WaypointGraph
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.frame import FARTHEST_M
+from hybridnav.rooms import Rooms
 from hybridnav.rooms.cutting import wall_directions
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.graphs.waypoint_graph import RouteGraph, WaypointGraph
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.rooms import Rooms
 
 _APART_M = 4.0
 """Distance between lanes in metres by default."""
@@ -169,7 +165,9 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
         if not complete(sketch, aims, near):
             break
         _connect(sketch, space)
-    _drop_single(sketch, named)
+    is_named = (sketch.positions[:, None] == np.array([*named.values()]).reshape(-1, 2)).all(2)
+    if len(sketch.edges):
+        sketch.keep_nodes(np.union1d(sketch.edges, np.flatnonzero(is_named.any(axis=1))))
     progress(4, _STEPS)
     graph = _described(topology, space, sketch, named)
     progress(_STEPS, _STEPS)
@@ -311,13 +309,6 @@ def _keep(sketch: Sketch, keep: RouteGraph | WaypointGraph, layout: Layout) -> N
     old = sketch.freed(known, _SAME_M / space.grid.resolution_m)
     sketch.keep(old, keep.edges, _same(sketch, keep), _STANDS * layout.apart)
     _connect(sketch, space)
-
-
-def _drop_single(sketch: Sketch, named: Mapping[str, FloatArray]) -> None:
-    """Drop nodes without an edge and a name, for no route leads there, unless there is no edge."""
-    is_named = (sketch.positions[:, None] == np.array([*named.values()]).reshape(-1, 2)).all(2)
-    if len(sketch.edges):
-        sketch.keep_nodes(np.union1d(sketch.edges, np.flatnonzero(is_named.any(axis=1))))
 
 
 def _freed(cells: LongArray, part_of: IntArray) -> LongArray:

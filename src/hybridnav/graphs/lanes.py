@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.joining import Nodes
 from hybridnav.graphs.judge import RIM_CELLS, FreeSpace
@@ -20,14 +22,9 @@ from hybridnav.graphs.waypoint_graph import LANE, RouteGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line
+from hybridnav.rooms import Rooms
 from hybridnav.rooms.doors import measured_clearance_m
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.rooms import Rooms
 
 
 def node_metadata(graph: RouteGraph, node: int) -> dict[str, Any]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hybridnav._base.clock import clock
@@ -15,11 +13,9 @@ from hybridnav.graphs.attach import PlacedGraph
 from hybridnav.graphs.waypoint_graph import WaypointGraph
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.baselines.regions import array_bytes
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.refine import Sight
-
-if TYPE_CHECKING:
-    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 

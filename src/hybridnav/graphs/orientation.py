@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray
 
 
 @dataclass(frozen=True)

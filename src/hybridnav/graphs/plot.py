@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import BoolArray, FloatArray
+from hybridnav.graphs import GraphCheck, RouteGraph
+from hybridnav.maps import OccupancyGrid
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, draw_shades, known_view
 from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import ground_entries
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.graphs import GraphCheck, RouteGraph
-    from hybridnav.maps import OccupancyGrid
 
 _COLOURS = {"error": style.PATH, "warning": style.HOLE, "note": style.PARALLEL}
 _MARKS = "sD^vo<>phP"

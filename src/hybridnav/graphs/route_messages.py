@@ -5,8 +5,9 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,13 +17,9 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.attach import placed_points
 from hybridnav.graphs.judge import FreeSpace
 from hybridnav.graphs.waypoint_graph import RouteGraph, WaypointGraph
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.messages import MOST_ID, header_message, path_message
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav.maps import OccupancyGrid
 
 
 def route_messages(

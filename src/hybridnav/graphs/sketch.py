@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import dist, hypot, hypots
-from hybridnav.graphs.strands import aligned, crosses, crossing, length_between, turn_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.graphs.strands import Passage
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+from hybridnav.graphs.strands import Passage, aligned, crosses, crossing, length_between, turn_of
 
 NOTHING, END, ROOM, DOOR = -1, 0, 1, 2
 """What a node is for: its edges only, the end of a lane, a room, a door; door n is

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.trig import cos, hypots, sin
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+from hybridnav.graphs.judge import FreeSpace
 from hybridnav.graphs.kernels import least_along, spread, thinned
 from hybridnav.maps.clearance import clearance_cells
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.graphs.judge import FreeSpace
 
 _HALL = 1.5
 """Width from which on free space is a hall, in distances between lanes: it gets two lanes or

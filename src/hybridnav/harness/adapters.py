@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridnav._base.typing import IntArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.harness.baselines import AnyAngleResult, CostClaim, MethodResult
-from hybridnav.maps import CellClass
-from hybridnav.planning import HybridPlanner, PlanStatus
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
+from hybridnav.planning import HybridPlanner, Metric, PlanResult, PlanStats, PlanStatus, Preset
 from hybridnav.search import found as search
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import IntArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import Metric, PlanResult, PlanStats, Preset
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
-from hybridnav.harness.outcome import Outcome
+from hybridnav.harness.outcome import MapQuery, Outcome
 from hybridnav.harness.records import (
+    Record,
     commands_of,
     latest_sources,
     loads_of,
@@ -23,7 +24,7 @@ from hybridnav.harness.records import (
     who_of,
 )
 from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
-from hybridnav.harness.yardstick import check_yardstick
+from hybridnav.harness.yardstick import Yardstick, check_yardstick
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from hybridnav._base.typing import PathLike
-    from hybridnav.harness.outcome import MapQuery
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.yardstick import Yardstick
 
 
 def not_everywhere(outcomes: Iterable[Outcome]) -> set[str]:

@@ -8,28 +8,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable, Sequence
 from operator import attrgetter, methodcaller
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridnav.harness.analysis import not_everywhere, pairs_in_common
+from hybridnav._base.typing import FloatArray
+from hybridnav.harness.analysis import Study, not_everywhere, pairs_in_common
 from hybridnav.harness.judges import summarise
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import EXPANSIONS, nanmean, nanquantile
-from hybridnav.harness.records import query_key
-from hybridnav.harness.tables import METHOD_COLUMNS, text_of
-from hybridnav.harness.yardstick import ANSWERED, KINDS, OPTIMA
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.analysis import Study
-    from hybridnav.harness.outcome import MapQuery, Outcome
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.tables import Row
-    from hybridnav.harness.yardstick import Kind, Optimum
+from hybridnav.harness.outcome import EXPANSIONS, MapQuery, Outcome, nanmean, nanquantile
+from hybridnav.harness.records import Record, query_key
+from hybridnav.harness.tables import METHOD_COLUMNS, Row, text_of
+from hybridnav.harness.yardstick import ANSWERED, KINDS, OPTIMA, Kind, Optimum
 
 RIGHTLY, WRONGLY = '"no path", right', '"no path", wrong'
 CONSISTENCY_COLUMNS = {

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.analysis import load_study
+from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.judges import paired_difference
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import loss_of, nanmean
+from hybridnav.harness.outcome import Outcome, loss_of, nanmean
 from hybridnav.harness.records import query_key
-from hybridnav.harness.yardstick import OPTIMA
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import PathLike
-    from hybridnav.harness.analysis import Study
-    from hybridnav.harness.outcome import Outcome
-    from hybridnav.harness.tables import Row, _Sample
-    from hybridnav.harness.yardstick import Optimum, Yardstick
+from hybridnav.harness.tables import Row, _Sample
+from hybridnav.harness.yardstick import OPTIMA, Optimum, Yardstick
 
 
 def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both") -> list[Row]:

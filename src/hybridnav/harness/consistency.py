@@ -8,7 +8,7 @@ own code: connectivity comes from scipy.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import sparse
@@ -16,14 +16,9 @@ from scipy.sparse import csgraph
 
 from hybridnav._base.moves import legal_moves, moves_along
 from hybridnav._base.rows import unique_rows
-from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.topology import TopologicalMap
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.topology import TopologicalMap
 
 Cell = tuple[int, int]
 
@@ -44,7 +39,9 @@ class Consistency:
         self._region = region_of.ravel()
         self._free = grid.classes == CellClass.FREE
         self._count = int(region_of.max(initial=-1)) + 1
-        moves = self._legal_moves(corner_cutting=grid.corner_cutting)
+        masks = legal_moves(self._free, grid.corner_cutting).ravel()
+        along = [moves_along(masks, self._cols, direction) for direction in (0, 2, 1, 3)]
+        moves = np.concatenate([np.stack(endpoints, axis=1) for endpoints in along])
         region = self._region[moves]
         same = (region[:, 0] == region[:, 1]) & (region[:, 0] >= 0)
         self._component = _components(moves[same], grid.classes.size)
@@ -73,12 +70,6 @@ class Consistency:
         crossings = np.stack([cell, cell + np.where(base & 1, self._cols, 1)], axis=1)
         kept = self._free.ravel()[crossings].all(axis=1) & ~topology.level.is_self_loop[arc]
         return crossings[kept], arc[kept]
-
-    def _legal_moves(self, *, corner_cutting: bool) -> LongArray:
-        """Return all moves between free cells, each in one direction, as flat cells (n, 2)."""
-        masks = legal_moves(self._free, corner_cutting).ravel()
-        along = [moves_along(masks, self._cols, direction) for direction in (0, 2, 1, 3)]
-        return np.concatenate([np.stack(endpoints, axis=1) for endpoints in along])
 
     def _keys(self, regions: IntArray) -> LongArray:
         """Return one number for each unordered pair of regions."""

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Container
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav import check_proof
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import HybridMethod
+from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.consistency import Consistency
 from hybridnav.harness.judges import (
     CheapestCost,
+    Chords,
     ScipyOptimum,
     VisibilityGraph,
     chords_of,
@@ -24,6 +28,9 @@ from hybridnav.harness.judges import (
     judge_path,
     line_cells,
 )
+from hybridnav.harness.methods import Prepared
+from hybridnav.harness.records import Record
+from hybridnav.harness.scenes import Pair
 from hybridnav.harness.yardstick import (
     ANY_ANGLE_SLACK,
     ARC_SLACK,
@@ -31,24 +38,12 @@ from hybridnav.harness.yardstick import (
     SLACK,
     AnyAngleOptimum,
     Fault,
+    Kind,
     compared,
 )
-from hybridnav.maps import CellClass
-from hybridnav.maps.costs import cost_along
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.search.grid_search import GridSearch
-
-if TYPE_CHECKING:
-    from collections.abc import Container
-
-    from hybridnav._base.typing import LongArray
-    from hybridnav.harness.baselines import AnyAngleResult, MethodResult
-    from hybridnav.harness.judges import Chords
-    from hybridnav.harness.methods import Prepared
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.scenes import Pair
-    from hybridnav.harness.yardstick import Kind
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
 
 Cell = tuple[int, int]
 

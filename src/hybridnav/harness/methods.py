@@ -6,27 +6,22 @@ import hashlib
 import inspect
 import json
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from hybridnav._base.clock import clock
 from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import FoundMethod, HybridMethod, close_method
-from hybridnav.harness.names import baseline_name, class_of, own_name, source_hash
-from hybridnav.planning import Preset, load_preset
+from hybridnav.harness.baselines import MethodResult, Solver
+from hybridnav.harness.names import NamedMethod, baseline_name, class_of, own_name, source_hash
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.costs import CostLayer
+from hybridnav.planning import Metric, Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav.harness.baselines import MethodResult, Solver
-    from hybridnav.harness.names import NamedMethod
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import Metric
 
 REFERENCE = "grid-astar"
 """The baseline whose lengths are the optimum; part of every run."""

@@ -7,16 +7,13 @@ import hashlib
 import importlib
 import inspect
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import Any
 
 from hybridnav.errors import InvalidValueError, brief
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from types import ModuleType
-
 
 ALIASES = {
     "a-star": "grid-astar",

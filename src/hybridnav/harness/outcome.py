@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.harness.judges import thrun_count
-from hybridnav.harness.records import QueryKey, path_steps, query_key
+from hybridnav.harness.records import QueryKey, Record, path_steps, query_key
 from hybridnav.harness.yardstick import (
     ANSWERED,
     ANY_ANGLE_SLACK,
@@ -18,16 +19,11 @@ from hybridnav.harness.yardstick import (
     PLANNED,
     SLACK,
     TOO_SLOW,
+    Optimum,
+    Yardstick,
     is_any_angle,
     octile_optimum_m,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.yardstick import Optimum, Yardstick
 
 EXPANSIONS = {
     "expanded": "cells expanded",

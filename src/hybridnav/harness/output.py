@@ -3,32 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.files import replace_file, without_controls
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.harness import columns, tables
 from hybridnav.harness.analysis import Study, load_study, pairs_in_common
 from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import REGIONS, Outcome, nanmean, nanquantile
 from hybridnav.harness.report import (
+    CaseKey,
     MapSection,
     ReportData,
     cases_of,
     counter_examples,
     render_report,
 )
-from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from hybridnav._base.typing import FloatArray, PathLike
-    from hybridnav.harness.report import CaseKey
-    from hybridnav.harness.yardstick import Optimum, Yardstick
+from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS, Optimum, Yardstick
 
 _EFFICIENCY = "Efficiency"
 _BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (pairs)"

@@ -11,34 +11,30 @@ from collections import Counter
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
+from typing_extensions import Self
 
 import hybridnav
 from hybridnav._base.moves import STEPS
+from hybridnav._base.typing import LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE
 from hybridnav.harness.yardstick import Fault, contradiction
 from hybridnav.maps.cells import MAX_CELLS
-
-if TYPE_CHECKING:
-    from typing_extensions import Self
-
-    from hybridnav._base.typing import LongArray
 
 try:
     import fcntl
 except ImportError:  # not a POSIX system: no lock there
     fcntl = None  # type: ignore[assignment]
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from types import TracebackType
+from collections.abc import Iterable
+from types import TracebackType
 
-    from hybridnav.harness.methods import MethodSpec
-    from hybridnav.harness.scenes import Pair
-    from hybridnav.harness.yardstick import Kind
+from hybridnav.harness.methods import MethodSpec
+from hybridnav.harness.scenes import Pair
+from hybridnav.harness.yardstick import Kind
 
 Record = dict[str, Any]
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]

@@ -8,39 +8,31 @@ import math
 import re
 import shlex
 import warnings
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import matplotlib as mpl
 import numpy as np
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, StrictUndefined, Template
+from matplotlib.axes import Axes
 from PIL import Image
 
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import MapError
+from hybridnav.harness.analysis import Study
 from hybridnav.harness.judges import chords_of
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.records import decode_path, query_key
+from hybridnav.harness.outcome import Outcome
+from hybridnav.harness.records import Record, decode_path, query_key
 from hybridnav.harness.scenes import MapSpec, map_digest, read_map
-from hybridnav.maps import MAX_CELLS, Frame
+from hybridnav.harness.tables import Table
+from hybridnav.maps import MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
 from hybridnav.viz.canvas import picture_bytes
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from jinja2 import Template
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.analysis import Study
-    from hybridnav.harness.outcome import Outcome
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.tables import Table
-    from hybridnav.maps import OccupancyGrid
-
 
 _CASE_WIDTH_IN = 4.0
 _CASE_DPI = 144.0

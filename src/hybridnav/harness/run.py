@@ -7,12 +7,14 @@ import math
 import shlex
 import sys
 import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError, MapWarning, brief
 from hybridnav.harness.methods import (
     REFERENCE,
@@ -22,7 +24,8 @@ from hybridnav.harness.methods import (
     named_spec,
     preset_spec,
 )
-from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, RecordFile, read_records
+from hybridnav.harness.names import NamedMethod
+from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, Record, RecordFile, read_records
 from hybridnav.harness.scenes import (
     SAMPLER_VERSION,
     GivenCosts,
@@ -40,19 +43,10 @@ from hybridnav.harness.task import Task
 from hybridnav.harness.timing import TimingTask, circumstances
 from hybridnav.harness.workers import run_local, run_on_cluster
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW
-from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
-from hybridnav.maps.files.movingai import load_scenarios
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.harness.names import NamedMethod
-    from hybridnav.harness.records import Record
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.files.movingai import Scenario
-    from hybridnav.planning import Preset
+from hybridnav.maps.files.movingai import Scenario, load_scenarios
+from hybridnav.planning import Preset
 
 MOVINGAI_MERGE_DISTANCE_M = 40.0
 """Default on MovingAI maps, whose cells are 1 m by agreement; the robot is a point there."""
@@ -180,13 +174,21 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
         if any(path.iterdir()) and not (path / RECORDS_FILE).exists():
             raise InvalidValueError(f"folder {folder} holds other files and no run: take a new one")
         with RecordFile(path, [task.method for task in tasks]) as records:
-            _check_costs(settings, records)
+            own = text_of_costs(settings.costs)
+            for other in sorted(records.costs - {own}):
+                raise InvalidValueError(
+                    f"folder {records.path.parent} holds a run {_with(other)}, and this one is "
+                    f"{_with(own)}: take a new folder"
+                )
             _write_settings(settings, path, _sources(tasks))
             total = len({name for task in tasks for name in task.ids})
             wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
             before = len(records.ids)
             done = total - sum(len(_new_ids(task, records.ids)) for task in wanted)
-            for some in _in_parts(wanted):
+            for some in (
+                [task for task in wanted if task.method.source],
+                [task for task in wanted if not task.method.source],
+            ):
                 needed = _needed(some, tasks, records)
                 done += sum(len(task.ids) for task in some) - sum(len(task.ids) for task in needed)
                 for batch in _run(settings, needed):
@@ -213,16 +215,6 @@ def _silence_s(settings: RunSettings, timing: Sequence[TimingTask]) -> float:
     return settings.timeout_s * max((len(task.methods) for task in timing), default=1)
 
 
-def _check_costs(settings: RunSettings, records: RecordFile) -> None:
-    """Raise `InvalidValueError` if the folder holds a run with other costs."""
-    own = text_of_costs(settings.costs)
-    for other in sorted(records.costs - {own}):
-        raise InvalidValueError(
-            f"folder {records.path.parent} holds a run {_with(other)}, and this one is "
-            f"{_with(own)}: take a new folder"
-        )
-
-
 def _with(costs: str) -> str:
     return f"with costs {costs}" if costs else "without costs"
 
@@ -233,13 +225,6 @@ def _run(settings: RunSettings, tasks: Sequence[Task | TimingTask]) -> Iterator[
     if settings.scheduler is not None:
         return run_on_cluster(tasks, address=settings.scheduler)
     return run_local(tasks, workers=settings.workers, timeout_s=settings.timeout_s)
-
-
-def _in_parts(tasks: Sequence[Task]) -> tuple[list[Task], list[Task]]:
-    """Return the tasks of classes of others, which may fail at once, and the other tasks."""
-    return [task for task in tasks if task.method.source], [
-        task for task in tasks if not task.method.source
-    ]
 
 
 def _needed(part: Sequence[Task], tasks: Sequence[Task], records: RecordFile) -> list[Task]:

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import warnings
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.costs.files import read_costs
 from hybridnav.maps.files import load_map
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.maps.files.movingai import Scenario
-
+from hybridnav.maps.files.movingai import Scenario
 
 GivenCosts = tuple[str, ...] | CostLayer
 """Texts as in `hybridnav plan --costs`, or a layer; an empty tuple for lengths."""

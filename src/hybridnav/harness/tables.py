@@ -6,22 +6,18 @@ import csv
 import io
 import json
 import math
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.harness.outcome import REGIONS
+from hybridnav.harness.analysis import Study
+from hybridnav.harness.outcome import REGIONS, Outcome
+from hybridnav.harness.records import Record
 from hybridnav.harness.yardstick import OPTIMA
 from hybridnav.planning import Preset
 from hybridnav.refine.ompl import OmplSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.analysis import Study
-    from hybridnav.harness.outcome import Outcome
-    from hybridnav.harness.records import Record
 
 Row = dict[str, str | float]
 

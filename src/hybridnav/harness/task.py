@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 import traceback
+from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hybridnav._base.clock import clock
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.harness.adapters import checked
+from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.judging import Judge, status_of
 from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
 from hybridnav.harness.names import own_settings
 from hybridnav.harness.records import (
+    Record,
     encode_path,
     environment,
     fault_fields,
@@ -25,6 +27,9 @@ from hybridnav.harness.records import (
 )
 from hybridnav.harness.scenes import (
     SAMPLER_VERSION,
+    MapSpec,
+    Pair,
+    Scene,
     map_digest,
     read_map,
     read_scene,
@@ -34,13 +39,6 @@ from hybridnav.harness.yardstick import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.maps import CellClass
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.files import example_map
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav.harness.baselines import AnyAngleResult, MethodResult
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.scenes import MapSpec, Pair, Scene
 
 
 @dataclass(frozen=True)

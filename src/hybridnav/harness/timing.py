@@ -12,29 +12,22 @@ import hashlib
 import math
 import os
 import statistics
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import prepare
-from hybridnav.harness.records import query_key
-from hybridnav.harness.scenes import read_scene
+from hybridnav.harness.methods import MethodSpec, Prepared, prepare
+from hybridnav.harness.outcome import Outcome
+from hybridnav.harness.records import Record, query_key
+from hybridnav.harness.scenes import MapSpec, Pair, read_scene
 from hybridnav.harness.task import warm_up
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from hybridnav.harness.methods import MethodSpec, Prepared
-    from hybridnav.harness.outcome import Outcome
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.scenes import MapSpec, Pair
 
 _DIGITS = 12
 LONG_S = 0.05

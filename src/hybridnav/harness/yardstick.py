@@ -4,15 +4,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.search.mesh import MeshSearch, build_mesh
-
-if TYPE_CHECKING:
-    from hybridnav.maps import OccupancyGrid
-
 
 Cell = tuple[int, int]
 Record = dict[str, Any]

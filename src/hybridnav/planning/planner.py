@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav._base.renamed import renamed
 from hybridnav._base.threads import Turns
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, renamed
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planning import PlanStatus, Preset, load_preset

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav._base.renamed import renamed
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, renamed
 from hybridnav.planning.endpoints import directed, read_points
 
 if TYPE_CHECKING:

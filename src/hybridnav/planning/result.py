@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 import numpy as np
 
 from hybridnav._base.copies import on_demand
-from hybridnav._base.renamed import renamed
 from hybridnav._base.trig import dist
-from hybridnav.errors import PlanError
+from hybridnav.errors import PlanError, renamed
 from hybridnav.route.route import Route
 from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
 from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414

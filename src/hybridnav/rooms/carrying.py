@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, OneWayRule, RoomLabels
 from hybridnav.maps.checks import checked_type
+from hybridnav.maps.room_labels import Point
 from hybridnav.rooms.doors import (
     LEAST_DOOR_M,
     RoomBoundaries,
@@ -29,12 +32,6 @@ from hybridnav.rooms.registering import (
     transform_of,
     turned,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps.room_labels import Point
 
 NUMBERED = re.compile(r"room-([1-9][0-9]{0,8})")
 """Names of rooms that nobody has named."""

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass
+from hybridnav.maps.room_labels import Point
+from hybridnav.rooms.level import Door, Rooms
 from hybridnav.rooms.listing import free_components
-
-if TYPE_CHECKING:
-    from hybridnav.maps.room_labels import Point
-    from hybridnav.rooms.level import Door, Rooms
 
 _REACH_M = 2.0
 """Metres from a room within which a point on furniture or a wall means it."""

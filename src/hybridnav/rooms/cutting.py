@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.trig import cos, tan
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import clearance_cells, closing
 from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 
 _CLOSE_M = 0.15
 _CLOSE_RAYS_M = 0.25

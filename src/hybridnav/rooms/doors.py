@@ -3,25 +3,21 @@ distance, so that the numbers of doors are lasting names."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import cos, hypots, sin, sines_and_cosines
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.one_way import OneWayRule
+from hybridnav.maps.room_labels import Point
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks, middles_of, sides_of
 from hybridnav.pyramid.start import kinds_of
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps.one_way import OneWayRule
-    from hybridnav.maps.room_labels import Point
 
 LEAST_DOOR_M = 0.3
 """Passage below which a boundary counts as a gap, in metres: a scan's noise makes many. Gaps have

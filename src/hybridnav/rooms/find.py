@@ -5,11 +5,12 @@ map, or anew in a part of it beside rooms that stay.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy import ndimage
 
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.maps.room_labels import MAX_ROOMS
@@ -26,11 +27,6 @@ from hybridnav.rooms.merging import (
     grown,
     least_cells,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
 Cell = tuple[int, int]
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.pyramid import DualGraphPyramid, Level
 from hybridnav.pyramid.cracks import endpoints_of
 from hybridnav.pyramid.level import LevelArc
 from hybridnav.rooms.doors import (
@@ -21,10 +22,6 @@ from hybridnav.rooms.doors import (
     measured_clearance_m,
 )
 from hybridnav.rooms.listing import Listing, RoomKind, kinds_of
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import DualGraphPyramid, Level
 
 
 @dataclass(frozen=True)

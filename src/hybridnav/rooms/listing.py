@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import Level
+from hybridnav.pyramid import Level
 
 LEAST_WIDTH_M = 1.0
 """Mean width below which a space is listed only if the robot can enter it, in metres."""

@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy import fft, ndimage
 
 from hybridnav._base.trig import atan2, cos, sin
-from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
+from hybridnav.maps import CellClass, OccupancyGrid
 
 _COARSE_M, _FINE_M = 0.2, 0.1
 """Sides of the pixels in which translations are searched, and distances to walls kept."""

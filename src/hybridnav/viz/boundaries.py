@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -14,15 +15,11 @@ from scipy.spatial import KDTree
 
 from hybridnav._base.moves import STEPS
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 from hybridnav.maps import CellClass
+from hybridnav.pyramid import Level
 from hybridnav.pyramid.graphs import FaceKind
 from hybridnav.viz.fields import Field, WalkTree, distance_to_rim, rounded, smoothed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
-    from hybridnav.pyramid import Level
 
 Corner = tuple[int, int]
 """A corner of cells: (row, col) in grid units, the lower left corner of cell (row, col)."""

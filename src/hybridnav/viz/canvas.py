@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -18,18 +20,11 @@ from PIL import Image
 
 from hybridnav._base.files import replace_file
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import AnyArray, ByteArray, FloatArray, PathLike
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.viz import style
 from hybridnav.viz.style import Sizes
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import AnyArray, ByteArray, FloatArray, PathLike
-    from hybridnav.maps import OccupancyGrid
 
 MAX_IMAGE_SIDE = 6000
 """Cells per side beyond which an image is averaged first, more than any page resolves."""

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, PathLike
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import OccupancyGrid
+from hybridnav.search.descent import KeptFields, WatchedDescent
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, checked_animation, draw_cells, known_view, save_frames
 from hybridnav.viz.layout import add_title, frame_axes
 from hybridnav.viz.levels import panels
 from hybridnav.viz.places import colour_vertices
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, PathLike
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.search.descent import KeptFields, WatchedDescent
 
 _MILLISECONDS = 1200
 """Time of a level; the whole path stays three times as long."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.path import Path
@@ -14,11 +14,8 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
-    from hybridnav.pyramid import Level
-
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
+from hybridnav.pyramid import Level
 
 _NEAR_RIM = 4.0
 """Extra cost of a step at the rim of a field, in steps."""

@@ -6,28 +6,23 @@ Names of places and rooms, numbers at doors, and the markers of start and goal.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from matplotlib import patheffects
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from numpy.typing import ArrayLike
 from scipy import ndimage
 
 from hybridnav._base.trig import hypots
-from hybridnav.maps import NO_ROOM
+from hybridnav._base.typing import BoolArray, FloatArray
+from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels
 from hybridnav.viz import style
+from hybridnav.viz.canvas import Canvas
 from hybridnav.viz.layout import text_width
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.viz.canvas import Canvas
 
 _SHAPES = {"start": ("o", 6.5), "goal": ("D", 6.0)}
 _ANCHORS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])

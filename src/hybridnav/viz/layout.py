@@ -14,7 +14,7 @@ from matplotlib.textpath import text_to_path
 from matplotlib.transforms import Bbox, ScaledTranslation, blended_transform_factory
 
 from hybridnav.viz import style
-from hybridnav.viz.canvas import MAX_HEIGHT, PAD_IN
+from hybridnav.viz.canvas import MAX_HEIGHT, PAD_IN, Canvas
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.legend import Legend
 
-    from hybridnav.viz.canvas import Canvas
 
 Entry = tuple[Any, str]
 """A handle of a legend and its label."""

@@ -6,29 +6,22 @@ Its levels side by side, and the arcs that are contracted and removed in one ste
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
+from hybridnav.pyramid import DualGraphPyramid, Level
 from hybridnav.viz import style
-from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
-from hybridnav.viz.layout import add_title, finish_with_axes, frame_axes, wrapped
+from hybridnav.viz.canvas import PAD_IN, Canvas, View, known_view
+from hybridnav.viz.layout import Entry, add_title, finish_with_axes, frame_axes, wrapped
 from hybridnav.viz.places import Places
 from hybridnav.viz.topology import Graph, draw_graph, draw_ground, drawable
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.pyramid import DualGraphPyramid, Level
-    from hybridnav.viz.canvas import View
-    from hybridnav.viz.layout import Entry
 
 GRAPH_UP_TO = 150
 """Most vertices of a panel with a graph: more would cover their own fields."""

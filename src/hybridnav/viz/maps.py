@@ -4,39 +4,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import ArrayLike
 
-from hybridnav.closures.blocked import as_blocked
+from hybridnav._base.typing import BoolArray
+from hybridnav.closures import OneWay
+from hybridnav.closures.blocked import Closable, as_blocked
 from hybridnav.closures.one_way import directions_on
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_points
+from hybridnav.maps.costs import CostLayer
+from hybridnav.pyramid import Level
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import layout, style
 from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
+from hybridnav.viz.layout import Entry
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.closures import OneWay
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.pyramid import Level
-    from hybridnav.viz.layout import Entry
-    from hybridnav.viz.style import Sizes
+from hybridnav.viz.style import Sizes
 
 MAX_VERTICES_WITH_ARCS = 2000
 """Vertices beyond which a level is drawn as fields alone: dots and arcs would cover them."""

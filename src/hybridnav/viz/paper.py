@@ -4,19 +4,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from hybridnav._base.typing import ByteArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.pyramid import Level
 from hybridnav.pyramid.graphs import FaceKind
+from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.boundaries import Boundaries
 from hybridnav.viz.canvas import PAD_IN, Canvas, known_view
-from hybridnav.viz.layout import add_legend, finish, frame_axes
+from hybridnav.viz.layout import Entry, add_legend, finish, frame_axes
 from hybridnav.viz.places import Places, colour_vertices
+from hybridnav.viz.style import Sizes
 from hybridnav.viz.topology import (
     FAINT,
     LEAST_AREA_M2,
@@ -26,18 +31,6 @@ from hybridnav.viz.topology import (
     drawable,
     graph_entries,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import ByteArray
-    from hybridnav.pyramid import Level
-    from hybridnav.topology import TopologicalMap
-    from hybridnav.viz.layout import Entry
-    from hybridnav.viz.style import Sizes
-
 
 _TITLES = ("a) places", "b) simple graph", "c) dual graph pyramid, top", "d) its dual")
 _GAP_IN = 0.12

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass
+from hybridnav.pyramid import Level
 from hybridnav.viz import style
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import Level
-    from hybridnav.viz.canvas import Canvas
-    from hybridnav.viz.style import Sizes
-
+from hybridnav.viz.canvas import Canvas
+from hybridnav.viz.style import Sizes
 
 TINY_M2 = 0.5
 """Area in square metres below which a place has no dot and its arcs are not drawn, unless a route

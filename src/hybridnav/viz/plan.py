@@ -3,37 +3,31 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray
+from hybridnav.closures.blocked import Closable
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
-from hybridnav.planning import COST_METRICS
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
+from hybridnav.planning import COST_METRICS, PlanResult
+from hybridnav.route import Route
+from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
 from hybridnav.viz.labels import Marker, draw_markers
 from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import arc_handle, draw_query, ground_entries, swatch
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlanResult
-    from hybridnav.route import Route
-    from hybridnav.topology import TopologicalMap
-    from hybridnav.viz.style import Sizes
-
+from hybridnav.viz.style import Sizes
 
 _LOOKS = 4
 """Points of a path that are looked up in the map, to a cell."""

@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import ByteArray, IntArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM
+from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels
+from hybridnav.rooms import Door, Rooms
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import MAX_HEIGHT, Canvas, draw_cells, known_view, new_figure
 from hybridnav.viz.labels import RoomWriter
-from hybridnav.viz.layout import finish_with_axes
+from hybridnav.viz.layout import Entry, finish_with_axes
 from hybridnav.viz.maps import draw_one_way, ground_entries, swatch
 from hybridnav.viz.places import colour_vertices
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import ByteArray, IntArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.rooms import Door, Rooms
-    from hybridnav.viz.layout import Entry
 
 _AROUND, _PANEL = 0.1, 0.46
 """Height of titles and legends of two maps, and width of each, as shares of the whole width."""

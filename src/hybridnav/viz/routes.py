@@ -3,34 +3,28 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from matplotlib import patheffects
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from hybridnav._base.typing import FloatArray
+from hybridnav.closures.blocked import Closable
+from hybridnav.guide import Tour
+from hybridnav.guide.alternatives import Alternatives
+from hybridnav.guide.words.bends import Leg
+from hybridnav.maps.costs import CostLayer
 from hybridnav.planning import COST_METRICS
+from hybridnav.rooms import Door, Rooms
+from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
-from hybridnav.viz.layout import finish
+from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import draw_query, ground_entries, swatch
 from hybridnav.viz.places import Places
 from hybridnav.viz.room_map import DOOR_POINTS, draw_doors, draw_room_cells, room_entry
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.guide import Tour
-    from hybridnav.guide.alternatives import Alternatives
-    from hybridnav.guide.words.bends import Leg
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.rooms import Door, Rooms
-    from hybridnav.topology import TopologicalMap
-    from hybridnav.viz.layout import Entry
 
 _TOUR_WIDTH, _WAYPOINT_POINTS = 1.6, 5.0
 _ROUTE_WIDTH, _WIDER, _CASING = 1.6, 1.9, 0.6

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
-from hybridnav.search.mesh import build_mesh
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.planning import Path
+from hybridnav.refine.ompl import Search
+from hybridnav.search.mesh import ConvexMesh, build_mesh
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
-from hybridnav.viz.layout import finish
+from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import ground_entries
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning import Path
-    from hybridnav.refine.ompl import Search
-    from hybridnav.search.mesh import ConvexMesh
-    from hybridnav.viz.layout import Entry
-
 
 _POLYGON, _SIDE = style.PLACES[4], style.PARALLEL
 _FULL = 0.45

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray
+from hybridnav._base.typing import ByteArray
 
 OCCUPIED = "#2b2b2b"
 BLOCKED = "#989898"

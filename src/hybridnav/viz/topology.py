@@ -4,30 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.pyramid import Level
 from hybridnav.pyramid.graphs import report_of
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.fields import Field, Loops, distance_to_rim, smoothed
 from hybridnav.viz.layout import Entry, finish
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.pyramid import Level
-    from hybridnav.viz.style import Sizes
-
+from hybridnav.viz.style import Sizes
 
 MAX_VERTICES = 20_000
 """Vertices of a level beyond which its graph is not drawn: it would be one grey area."""

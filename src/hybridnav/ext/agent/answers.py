@@ -6,25 +6,22 @@ import math
 import tempfile
 import threading
 from collections import OrderedDict
+from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.trig import dist
+from hybridnav.closures import Blocked
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.ext.agent import places
 from hybridnav.ext.agent import questions as ask
 from hybridnav.ext.page.requests import Edit, Save
+from hybridnav.ext.page.session import Session
 from hybridnav.guide import Tour, plan_tour
+from hybridnav.planning import HybridPlanner
 from hybridnav.reasons.why import explain, explain_solved
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Sequence
-
-    from hybridnav.closures import Blocked
-    from hybridnav.ext.page.session import Session
-    from hybridnav.planning import HybridPlanner
-    from hybridnav.rooms import Rooms
-    from hybridnav.topology import TopologicalMap
+from hybridnav.rooms import Rooms
+from hybridnav.topology import TopologicalMap
 
 _MOST_PLANNERS = 3
 """Widths whose planners are kept."""
@@ -33,7 +30,54 @@ _PASSED = 16
 """Rooms that a route lists."""
 
 
-class MapAnswers:
+class _Answers:
+    """What answers about a map and about a building share.
+
+    `known`: all functions; `kinds`: of things that can be closed.
+    """
+
+    def __init__(
+        self, known: Sequence[ask.Tool], kinds: Sequence[str], *, allow_edits: bool
+    ) -> None:
+        self._known, self.allow_edits = known, allow_edits
+        self.tools = ask.tools(known, allow_edits=allow_edits)
+        self._lock = threading.RLock()
+        self._changes = Changes(kinds)
+
+    def call(self, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
+        """Answer a question.
+
+        Parameters
+        ----------
+        name
+            The name of one of `TOOLS`.
+        arguments
+            Those of its model.
+
+        Returns
+        -------
+        dict
+            An `Answer`; with `ok` False if the question cannot be answered as it is, where `text`
+            has advice, and `choices` the meanings of a name. Pictures have `png`, bytes.
+        """
+        functions = {tool: getattr(self, f"_{tool.name}") for tool in self._known}
+        with self._lock:
+            return ask.answer_of(functions, name, arguments, allow_edits=self.allow_edits)
+
+    def _named(self, asked: Any) -> list[places.Thing]:
+        raise NotImplementedError
+
+    def _close(self, asked: Any) -> dict[str, Any]:
+        return self._changes.close(self._named(asked))
+
+    def _open(self, asked: Any) -> dict[str, Any]:
+        return self._changes.open(self._named(asked))
+
+    def _undo(self, _: ask.TakeBack) -> dict[str, Any]:
+        return self._changes.undo()
+
+
+class MapAnswers(_Answers):
     """Answers about one map. Threads may share it; one call is answered at a time.
 
     Parameters
@@ -56,32 +100,10 @@ class MapAnswers:
     """
 
     def __init__(self, session: Session, *, allow_edits: bool = False) -> None:
-        self._session, self.allow_edits = session, allow_edits
-        self.tools = ask.tools(allow_edits=allow_edits)
+        super().__init__(ask.TOOLS, ("doors", "rooms"), allow_edits=allow_edits)
+        self._session = session
         self.instructions = ask.INSTRUCTIONS.format(point="[x, y]")
-        self._lock = threading.RLock()
-        self._changes = Changes()
         self._planners: OrderedDict[float, HybridPlanner] = OrderedDict()
-
-    def call(self, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
-        """Answer a question.
-
-        Parameters
-        ----------
-        name
-            The name of one of `TOOLS`.
-        arguments
-            Those of its model.
-
-        Returns
-        -------
-        dict
-            An `Answer`; with `ok` False if the question cannot be answered as it is, where `text`
-            has advice, and `choices` the meanings of a name. Pictures have `png`, bytes.
-        """
-        functions = {tool: getattr(self, f"_{tool.name}") for tool in ask.TOOLS}
-        with self._lock:
-            return ask.answer_of(functions, name, arguments, allow_edits=self.allow_edits)
 
     # The map.
 
@@ -261,35 +283,19 @@ class MapAnswers:
         if not goals:
             known = [name for name in self._places.listed() if name != start]
             raise places.nothing(asked.of, "nothing", known, self._places.choices)
-        goals.sort(key=lambda goal: dist(goal[1], here))
-        best: list[tuple[float, dict[str, Any]]] = []
-        others_m = math.inf
-        for facts, point in goals:
-            straight_m = dist(point, here)
-            if len(best) >= asked.count and straight_m >= best[asked.count - 1][0]:
-                others_m = straight_m  # no path to this one or a later one is shorter
-                break
+
+        def plan(point: places.Point) -> tuple[float, dict[str, Any]]:
             found = planner.draft(here, point, blocked=shut)
-            if math.isfinite(found.cost):
-                bound_m = places.rounded_down(found.lower_bound)
-                lengths = {"length_m": round(found.cost, 3), "lower_bound_m": bound_m}
-                best.append((found.cost, facts | lengths))
-                best.sort(key=lambda one: one[0])
-        if not best:
-            raise ask.UnclearError(
-                f"none of {len(goals)} of {asked.of!r:.80} can be reached from there"
-            )
-        others_m = min([others_m, *(length for length, _ in best[asked.count :])])
-        best = best[: asked.count]
-        names = ", ".join(
-            f"{facts.get('name') or 'door ' + str(facts['number'])} ({length:.2f} m)"
-            for length, facts in best
+            if not math.isfinite(found.cost):
+                return found.cost, {}
+            bound_m = places.rounded_down(found.lower_bound)
+            return found.cost, {"length_m": round(found.cost, 3), "lower_bound_m": bound_m}
+
+        goals.sort(key=lambda goal: dist(goal[1], here))
+        least = [(dist(at, here), k, facts, at) for k, (facts, at) in enumerate(goals)]
+        return nearest_answer(
+            asked, least, plan, lambda _, length_m: f" ({length_m:.2f} m)", " from there"
         )
-        return {
-            "text": f"Nearest: {names}.",
-            "nearest": [facts for _, facts in best],
-            "others_at_least_m": places.rounded_down(others_m) if math.isfinite(others_m) else None,
-        }
 
     def _picture(self, asked: ask.Picture) -> dict[str, Any]:
         from hybridnav import viz  # noqa: PLC0415 - loads matplotlib
@@ -309,18 +315,9 @@ class MapAnswers:
 
     # Changes.
 
-    def _close(self, asked: ask.Close) -> dict[str, Any]:
-        return self._changes.close(self._named(asked))
-
-    def _open(self, asked: ask.Open) -> dict[str, Any]:
-        return self._changes.open(self._named(asked))
-
     def _named(self, asked: ask.Close) -> list[places.Thing]:
         found = self._places.things(asked.doors, of_doors=True)
         return found + self._places.things(asked.rooms)
-
-    def _undo(self, _: ask.TakeBack) -> dict[str, Any]:
-        return self._changes.undo()
 
     def _name_room(self, asked: ask.NameRoom) -> dict[str, Any]:
         old = self._places.meant(asked.room, list(self._rooms.names))
@@ -338,7 +335,7 @@ class Changes:
     `kinds`: of things that can be closed.
     """
 
-    def __init__(self, kinds: Sequence[str] = ("doors", "rooms")) -> None:
+    def __init__(self, kinds: Sequence[str]) -> None:
         self._kinds = kinds
         self.closed: tuple[places.Thing, ...] = ()
         self._before: list[tuple[places.Thing, ...] | Callable[[], dict[str, Any]]] = []
@@ -411,6 +408,42 @@ def rooms_answer(found: Sequence[dict[str, Any]], asked: ask.ListRooms) -> dict[
     rest = len(found) - asked.first - len(shown)
     text = f"{len(found)} rooms" + (f", {rest} more after these" if rest > 0 else "")
     return {"text": text, "total": len(found), "rooms": shown}
+
+
+def nearest_answer(
+    asked: ask.Nearest,
+    goals: Iterable[tuple[float, int, dict[str, Any], Any]],
+    plan: Callable[[Any], tuple[float, dict[str, Any]]],
+    words: Callable[[dict[str, Any], float], str],
+    there: str = "",
+) -> dict[str, Any]:
+    """Plan to goals in the order of their bounds, until no other can be nearer.
+
+    `goals`: the bound, rank among equals, facts and place of each; `plan`: returns the cost to a
+    place, infinite for none, and more facts; `words`: what follows a name, of its facts and cost.
+    """
+    best: list[tuple[float, int, dict[str, Any]]] = []
+    others_m, waiting = math.inf, sorted(goals, key=lambda goal: goal[:2])
+    for least_m, k, facts, place in waiting:
+        if len(best) >= asked.count and least_m >= best[asked.count - 1][0]:
+            others_m = least_m  # no path to this one or a later one is shorter
+            break
+        cost, figures = plan(place)
+        if math.isfinite(cost):
+            best = sorted([*best, (cost, k, facts | figures)], key=lambda one: one[:2])
+    if not best:
+        raise ask.UnclearError(f"none of {len(waiting)} of {asked.of!r:.80} can be reached{there}")
+    others_m = min([others_m, *(cost for cost, *_ in best[asked.count :])])
+    best = best[: asked.count]
+    names = ", ".join(
+        f"{one.get('name') or 'door ' + str(one['number'])}{words(one, cost)}"
+        for cost, _, one in best
+    )
+    return {
+        "text": f"Nearest: {names}.",
+        "nearest": [facts for *_, facts in best],
+        "others_at_least_m": places.rounded_down(others_m) if math.isfinite(others_m) else None,
+    }
 
 
 def png_of(ax: Any) -> bytes:

@@ -4,35 +4,23 @@ from __future__ import annotations
 
 import math
 import re
-import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.agent import floors as ask
 from hybridnav.ext.agent import places
-from hybridnav.ext.agent.answers import Changes, png_of, renamed, rooms_answer
+from hybridnav.ext.agent.answers import _Answers, nearest_answer, png_of, renamed, rooms_answer
 from hybridnav.ext.agent.places import NamedPlaces, Thing
-from hybridnav.ext.agent.questions import (
-    INSTRUCTIONS,
-    DescribeMap,
-    NameRoom,
-    TakeBack,
-    UnclearError,
-    answer_of,
-    tools,
-)
+from hybridnav.ext.agent.questions import INSTRUCTIONS, DescribeMap, NameRoom, UnclearError
+from hybridnav.ext.fleet import Building, BuildingPlan, Link
 from hybridnav.ext.fleet.building import legs_of, tightest
 from hybridnav.ext.fleet.links import ClosedLink
+from hybridnav.ext.page import Site
 from hybridnav.guide.words import check_language
 from hybridnav.guide.words.itinerary import guide_of
 from hybridnav.maps.names import folded, place_of_name, read_point
 from hybridnav.planning import Profile
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from hybridnav.ext.fleet import Building, BuildingPlan, Link
-    from hybridnav.ext.page import Site
 
 Waypoint = tuple[str, "tuple[float, float] | str"]
 """A floor, and a point or a name on it."""
@@ -45,7 +33,7 @@ _MOST_POINTS = 200
 _KIND = re.compile(r"(link|room)[: ]\s*(.+)", re.IGNORECASE)
 
 
-class BuildingAnswers:
+class BuildingAnswers(_Answers):
     """Answers about a building. Threads may share it; one call is answered at a time.
 
     Parameters
@@ -69,17 +57,9 @@ class BuildingAnswers:
     """
 
     def __init__(self, site: Site, *, allow_edits: bool = False) -> None:
-        self._site, self.allow_edits = site, allow_edits
-        self.tools = tools(ask.TOOLS, allow_edits=allow_edits)
+        super().__init__(ask.TOOLS, ("doors", "rooms", "links"), allow_edits=allow_edits)
+        self._site = site
         self.instructions = INSTRUCTIONS.format(point="[floor, x, y]") + _WITH_FLOORS
-        self._lock = threading.RLock()
-        self._changes = Changes(("doors", "rooms", "links"))
-
-    def call(self, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
-        """Answer a question; see `MapAnswers.call`."""
-        functions = {tool: getattr(self, f"_{tool.name}") for tool in ask.TOOLS}
-        with self._lock:
-            return answer_of(functions, name, arguments, allow_edits=self.allow_edits)
 
     # The building.
 
@@ -237,42 +217,25 @@ class BuildingAnswers:
         names, building, how = self._names, self._building, self._how([])
         start = names.place(asked.start)
         here = start[0], names.point_of(start)
-        blocked, links = how["blocked"], how["closed_links"]
-        found = names.candidates(asked.of, start)
+        closed = {key: how[key] for key in ("blocked", "closed_links")}
+
+        def plan_to(place: Waypoint) -> tuple[float, dict[str, Any]]:
+            plan = building.plan(here, place, **how)
+            if not plan.solved:
+                return math.inf, {}
+            return plan.cost, {
+                "floor": place[0],
+                "length_m": round(plan.length_m, 3),
+                "cost_m": round(plan.cost, 3),
+                "lower_bound_m": places.rounded_down(plan.lower_bound),
+            }
+
         goals = [
-            (building.least_m(here, (floor, point), blocked=blocked, closed_links=links), k, facts)
-            for k, (floor, facts, point) in enumerate(found)
+            (building.least_m(here, (floor, point), **closed), k, facts, (floor, point))
+            for k, (floor, facts, point) in enumerate(names.candidates(asked.of, start))
         ]
-        best: list[tuple[float, int, dict[str, Any]]] = []
-        others_m = math.inf
-        for least_m, k, facts in sorted(goals, key=lambda goal: goal[:2]):
-            if len(best) >= asked.count and least_m >= best[asked.count - 1][0]:
-                others_m = least_m
-                break
-            floor, _, point = found[k]
-            plan = building.plan(here, (floor, point), **how)
-            if plan.solved:
-                figures = {
-                    "floor": floor,
-                    "length_m": round(plan.length_m, 3),
-                    "cost_m": round(plan.cost, 3),
-                    "lower_bound_m": places.rounded_down(plan.lower_bound),
-                }
-                best = sorted([*best, (plan.cost, k, facts | figures)], key=lambda one: one[:2])
-        if not best:
-            raise UnclearError(f"none of {len(goals)} of {asked.of!r:.80} can be reached")
-        others_m = min([others_m, *(cost for cost, *_ in best[asked.count :])])
-        shown = [facts for *_, facts in best[: asked.count]]
-        listed = ", ".join(
-            f"{one.get('name') or 'door ' + str(one['number'])} on floor {one['floor']} "
-            f"(cost {one['cost_m']:.2f} m)"
-            for one in shown
-        )
-        return {
-            "text": f"Nearest: {listed}.",
-            "nearest": shown,
-            "others_at_least_m": places.rounded_down(others_m) if math.isfinite(others_m) else None,
-        }
+        words = " on floor {floor} (cost {cost_m:.2f} m)"
+        return nearest_answer(asked, goals, plan_to, lambda one, _: words.format(**one))
 
     def _picture(self, asked: Any) -> dict[str, Any]:
         from hybridnav.ext.fleet.plot import plot_building  # noqa: PLC0415 - loads matplotlib
@@ -289,18 +252,9 @@ class BuildingAnswers:
 
     # Changes.
 
-    def _close(self, asked: Any) -> dict[str, Any]:
-        return self._changes.close(self._named(asked))
-
-    def _open(self, asked: Any) -> dict[str, Any]:
-        return self._changes.open(self._named(asked))
-
     def _named(self, asked: Any) -> list[Thing]:
         names = self._names
         return names.things(asked.doors, of_doors=True) + names.things(asked.rooms + asked.links)
-
-    def _undo(self, _: TakeBack) -> dict[str, Any]:
-        return self._changes.undo()
 
     def _name_room(self, asked: NameRoom) -> dict[str, Any]:
         floor, old = self._names.named(*self._names.parted(asked.room))

@@ -5,26 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from hybridnav._base.trig import dist, hypots
 from hybridnav.closures import Blocked
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.agent.questions import UnclearError
+from hybridnav.ext.agent.questions import ListRooms, UnclearError
 from hybridnav.maps import CellClass
 from hybridnav.maps.names import did_you_mean, folded, matching, natural_key, nearest
 from hybridnav.planning import HybridPlanner
 from hybridnav.planning.profile import rebuilt
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from hybridnav.ext.agent.questions import ListRooms
-    from hybridnav.reasons import Explanation
-    from hybridnav.rooms import Door, Rooms
+from hybridnav.reasons import Explanation
+from hybridnav.rooms import Door, Rooms
 
 Point = tuple[float, float]
 _ARTICLES = {"the", "a", "an", "der", "die", "das", "dem", "den", "ein", "eine", "einen", "einem"}

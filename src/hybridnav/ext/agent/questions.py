@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import asyncio
 import json
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
     BaseModel,
@@ -21,10 +22,6 @@ from pydantic_core import PydanticCustomError
 
 from hybridnav.errors import HybridNavError, InvalidValueError, brief
 from hybridnav.maps.names import did_you_mean
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
 
 # Language models send lists as their JSON text, one thing for a list of one, and true for a number.
 

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.trig import atan2, cos, hypots, sin
+from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorArea, FloorGraph
 from hybridnav.ext.fleet.links import Link, LinkEnd
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import OccupancyGrid
 
 Pose = tuple[float, float, float]
 """`(x, y, yaw)` of one frame in another, in metres and radians."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.clock import clock
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav.closures import Journal
 from hybridnav.closures.blocked import Blocked, Closable, as_blocked
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.fleet import checks, why
@@ -18,20 +20,13 @@ from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
 from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
 from hybridnav.ext.fleet.search import Endpoint, LinkSearch
 from hybridnav.maps.names import place_of_name
+from hybridnav.models.container import Part
+from hybridnav.planning import HybridPlanner, Profile
+from hybridnav.planning.named import At
 from hybridnav.planning.private_rooms import Privacy
 from hybridnav.planning.profile import PROFILES, profile_of
 from hybridnav.reasons.why import explain_solved
 from hybridnav.search.found import ClosedCells
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav.closures import Journal
-    from hybridnav.models.container import Part
-    from hybridnav.planning import HybridPlanner, Profile
-    from hybridnav.planning.named import At
 
 FloorWaypoint: TypeAlias = "str | tuple[str, ArrayLike | str]"
 """A floor and a point or name on it, or a name that only one floor has."""

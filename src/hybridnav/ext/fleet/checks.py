@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import LongArray
+from hybridnav.closures import OutOfOrder
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.links import ClosedLink, Link, LinkEnd
+from hybridnav.ext.fleet.plan import BuildingPlan
 from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.guide.words.itinerary import guide_of
 from hybridnav.maps import CellClass
@@ -21,14 +25,7 @@ from hybridnav.planning import HybridPlanner, PlanStatus, Profile
 from hybridnav.planning.endpoints import places_of_endpoints, read_point, refusal
 from hybridnav.planning.named import check_names
 from hybridnav.planning.profile import ProfiledFloor, forbidden, in_the_way, under_profile
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from hybridnav._base.typing import LongArray
-    from hybridnav.closures import OutOfOrder
-    from hybridnav.ext.fleet.plan import BuildingPlan
-    from hybridnav.search.found import ClosedCells
+from hybridnav.search.found import ClosedCells
 
 _LEAST_PART = 0.05
 """Share of the largest connected part of a floor that a part with the end of a link has."""

@@ -12,7 +12,7 @@ import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import common
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
-from hybridnav.cli.query import check_alternatives, checked_at, one_of
+from hybridnav.cli.query import PlanOptions, check_alternatives, checked_at, one_of
 from hybridnav.cli.reading import check_model, read_settings
 from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
 from hybridnav.guide.words import check_language
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from hybridnav.cli.build import BuildOptions
     from hybridnav.cli.map_options import FloorOptions, MapOptions
-    from hybridnav.cli.query import PlanOptions
     from hybridnav.ext.fleet import BuildingAlternatives
 
 

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet.links import Link  # noqa: TC001 - pydantic reads it
+from hybridnav.ext.fleet.links import Link
+from hybridnav.maps import RoomLabels
 from hybridnav.models.container import Part, buffers_of
 from hybridnav.models.parts import plain
 from hybridnav.models.structures import BUILDING, FLOOR
+from hybridnav.planning import HybridPlanner, PlanResult
 from hybridnav.planning.profile import PROFILES, Profile
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.maps import RoomLabels
-    from hybridnav.planning import HybridPlanner, PlanResult
-    from hybridnav.search.found import ClosedCells
+from hybridnav.search.found import ClosedCells
 
 ROUNDED = 1.0 - 1e-12
 """Factor on sums and differences of lengths that serve as bounds, because they are rounded."""

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from hybridnav._base.clock import clock
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet.building import Building
 from hybridnav.ext.fleet.checks import parts_of
 from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Position
+from hybridnav.ext.fleet.plan import BuildingPlan
 from hybridnav.graphs.check import GraphCheck, check_graph
 from hybridnav.graphs.gather import Finding, Findings, shown
 from hybridnav.graphs.judge import LEAST_AREA_M2, Excess, excess_of
@@ -27,13 +31,6 @@ from hybridnav.graphs.waypoint_graph import (
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.planning.settings import ShortestSettings
 from hybridnav.rooms.find import outside_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.ext.fleet.building import Building
-    from hybridnav.ext.fleet.plan import BuildingPlan
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,15 +12,11 @@ from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.align import Pose, moved_floor, moved_point, placed_pose
 from hybridnav.ext.fleet.building import Building
+from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorGraph, Point, join_links
+from hybridnav.ext.fleet.links import Link
 from hybridnav.graphs.attach import placed_points
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from hybridnav.ext.fleet.floors import Floor
-    from hybridnav.ext.fleet.links import Link
 
 AT_LINK_M = 1.0
 """Distance in metres up to which the end of a graph's link is taken for that of the building's."""

@@ -5,20 +5,18 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.trig import dist, hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+from hybridnav.ext.fleet.building import Building
 from hybridnav.ext.fleet.graph_match import AT_LINK_M, MatchedGraph, MatchedLink
 from hybridnav.ext.fleet.link_nodes import FloorGraph, Point, node_at
 from hybridnav.graphs import attach
+from hybridnav.maps import OccupancyGrid
 from hybridnav.refine import Sight
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.fleet.building import Building
-    from hybridnav.maps import OccupancyGrid
 
 Position = tuple[int, "FloatArray"]
 """Index of a floor in the building, and float64 (2,), (row, col) in grid units of its map."""

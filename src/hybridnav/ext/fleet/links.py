@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.names import place_of_name
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
-
-    from hybridnav._base.typing import FloatArray, LongArray
 
 LinkKind = Literal["lift", "stairs", "ramp"]
 """Kinds of links between floors."""

@@ -7,7 +7,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
+
+from typing_extensions import Self
 
 from hybridnav._base.clock import clock
 from hybridnav.errors import PlanError
@@ -17,9 +19,6 @@ from hybridnav.ext.fleet.search import COUNTS, Endpoint, LinkSearch, stats_of
 from hybridnav.guide.words import FloorChange, Instruction, Space, sentences
 from hybridnav.guide.words.itinerary import Guide, guide_of, heading_of, waypoint_text
 from hybridnav.planning import Metric, Path, PlanResult, PlanStats, PlanStatus
-
-if TYPE_CHECKING:
-    from typing_extensions import Self
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet import Building, BuildingPlan, Floor, Link, LinkEnd
 from hybridnav.maps import CellClass
@@ -18,13 +21,6 @@ from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import Entry, add_legend, add_scale_bar, add_title, frame_axes, text_width
 from hybridnav.viz.maps import draw_one_way, ground_entries
 from hybridnav.viz.room_map import draw_room_cells, room_entry
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import FloatArray
 
 _MARKS = {"lift": "s", "stairs": "^", "ramp": "D"}
 _POINTS = 6.0

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import heapq
 import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.ext.fleet.floors import ROUNDED, FloorTable
 from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, LinkNetwork, Part
 from hybridnav.planning import HybridPlanner, PlanStats, PlanStatus
+from hybridnav.planning.named import At
 from hybridnav.planning.result import PlanDraft
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray, IntArray
-    from hybridnav.planning.named import At
-    from hybridnav.search.found import ClosedCells
+from hybridnav.search.found import ClosedCells
 
 _MOST_LABELS = 20_000
 """Labels after which the search for one more route ends."""

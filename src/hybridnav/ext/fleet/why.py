@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from hybridnav.closures.blocked import Blocked, as_blocked
+from hybridnav.closures.blocked import Blocked, Closable, as_blocked
+from hybridnav.ext.fleet.floors import Floor
+from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
+from hybridnav.ext.fleet.plan import BuildingPlan
+from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.planning import PlanStatus
-from hybridnav.reasons.why import each_closure, explain
-from hybridnav.reasons.why_words import closure_words
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
-
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.ext.fleet.floors import Floor
-    from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
-    from hybridnav.ext.fleet.plan import BuildingPlan
-    from hybridnav.ext.fleet.search import Endpoint
-    from hybridnav.reasons.why import Explanation
-    from hybridnav.reasons.why_words import Closure
+from hybridnav.reasons.why import Explanation, each_closure, explain
+from hybridnav.reasons.why_words import Closure, closure_words
 
 _WORDS = {
     "en": {

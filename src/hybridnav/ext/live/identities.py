@@ -5,24 +5,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.live.state import CellDraft
 from hybridnav.ext.live.tiles import NO_PLACE, Box
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer
 from hybridnav.rooms.carrying import Heirs, Overlap, heirs_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.ext.live.state import CellDraft
 
 _ALIGNED = 1e-6
 """Part of a cell by which the origins of two grids may lie beside whole cells."""

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from operator import attrgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import ByteArray, IntArray, PathLike
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.live import OnlineRooms, ReplayStep
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.viz import style
 from hybridnav.viz.canvas import (
@@ -23,12 +26,6 @@ from hybridnav.viz.canvas import (
 )
 from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.room_map import DOOR_POINTS
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from hybridnav._base.typing import ByteArray, IntArray, PathLike
-    from hybridnav.ext.live import OnlineRooms, ReplayStep
 
 _MARGINS_IN = (0.65, 0.5, 0.12, 0.3)
 """Left, below, right and above each map: its axes, their names, its title."""

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.identities import Flips, Numbered, flips_between
+from hybridnav.ext.live.mapping import LaserScan, Mapper
 from hybridnav.ext.live.pyramid import OnlinePyramid, Update, changed_cells
 from hybridnav.ext.live.room_versions import OnlineRooms, RoomsUpdate
 from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.pyramid import DualGraphPyramid, Level
 from hybridnav.pyramid.cracks import endpoints_of, find_cracks
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from hybridnav.ext.live.mapping import LaserScan, Mapper
 
 
 @dataclass(frozen=True, eq=False)

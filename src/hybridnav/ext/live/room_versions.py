@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.typing import BoolArray, IntArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live import rooms_window as window
 from hybridnav.ext.live.identities import placed, shift_of
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import check_names
+from hybridnav.maps.one_way import OneWayRule
+from hybridnav.maps.room_labels import Point
 from hybridnav.rooms.carrying import NUMBERED
 from hybridnav.rooms.doors import one_way_that_holds
 from hybridnav.rooms.find import check_least_area, find_rooms, outside_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from hybridnav._base.typing import BoolArray, IntArray
-    from hybridnav.maps.one_way import OneWayRule
-    from hybridnav.maps.room_labels import Point
 
 
 @copies_alike

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import reduce
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
 from hybridnav.ext.live.identities import Events
 from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_mask
 from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.room_labels import Point
 from hybridnav.rooms.doors import LEAST_DOOR_M, RoomBoundaries, measured_clearance_m
 from hybridnav.rooms.find import LEFT_OUT, WALL_REACH_M, reaching, renewed_rooms
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping
-
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.maps.room_labels import Point
 
 _MARGIN_M = 0.3
 """A changed cell touches the rooms within this distance: walls belong to rooms up to 0.25 m."""

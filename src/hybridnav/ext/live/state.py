@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.kernels import merging as _merge_kernels
 from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.near import PlaceColumns, box_groups
 from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
+from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.contraction import Window
 from hybridnav.pyramid.decimation import Criterion, contract_alone, contract_places, squared_limit
 from hybridnav.pyramid.record import SURVIVES, BuildStats, Patch, Record
 from hybridnav.pyramid.start import PERIOD, parts_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 # The table of places.
 

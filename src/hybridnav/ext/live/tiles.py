@@ -4,18 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.typing import ByteArray, IntArray, LongArray
 from hybridnav.ext.live.kernels import tiles as _tile_kernels
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from hybridnav._base.typing import ByteArray, IntArray, LongArray
 
 SIDE = 64
 """Rows and columns of a tile. A copy takes 3 us: larger tiles are beyond the size for which memory

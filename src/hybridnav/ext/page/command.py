@@ -13,7 +13,7 @@ from hybridnav._base.files import printable
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, answer, check_output
 from hybridnav.cli.map_options import FloorOptions, MapOptions
-from hybridnav.cli.options import OneMap, option
+from hybridnav.cli.options import Costs, OneMap, option
 from hybridnav.cli.reading import check_room_to_be
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.command import load_floors, preset_of_floors
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
     import hybridnav as hn
-    from hybridnav.cli.options import Costs
     from hybridnav.ext.fleet.files.entries import Entries, FloorEntry
     from hybridnav.ext.page import Opening, Site
     from hybridnav.ext.page.kept import RoomsFile

@@ -4,32 +4,27 @@ from __future__ import annotations
 
 import math
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
-from hybridnav.closures import Blocked, OneWay
+from hybridnav._base.typing import BoolArray, FloatArray
+from hybridnav.closures import Blocked, Journal, OneWay
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import requests as ask
-from hybridnav.guide import plan_alternatives
+from hybridnav.guide import Tour, plan_alternatives
 from hybridnav.guide.tour import tour_of
 from hybridnav.maps import CellClass, OccupancyGrid, OneWayRule
+from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.names import natural_key
-from hybridnav.planning import PlanResult, load_preset, preset_names, under
+from hybridnav.models import Model
+from hybridnav.planning import HybridPlanner, PlanResult, Preset, load_preset, preset_names, under
+from hybridnav.pyramid import Level
+from hybridnav.rooms import Door, Rooms
 from hybridnav.rooms.choices import leading_doors
+from hybridnav.topology import TopologicalMap
 from hybridnav.viz.places import Places
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.closures import Journal
-    from hybridnav.guide import Tour
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.models import Model
-    from hybridnav.planning import HybridPlanner, Preset
-    from hybridnav.pyramid import Level
-    from hybridnav.rooms import Door, Rooms
-    from hybridnav.topology import TopologicalMap
 
 MOST_VERTICES = 20_000
 """Vertices of a level beyond which its graph is not sent: it would be one grey area."""

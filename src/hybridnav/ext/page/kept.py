@@ -5,23 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 import threading
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav.closures import Journal, OutOfOrder
 from hybridnav.errors import InvalidValueError, RoomsError
+from hybridnav.ext.page.requests import ClosingChange, Favour, Find
+from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.names import folded, matching
+from hybridnav.planning import Profile
 from hybridnav.rooms.files import save_rooms
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    from hybridnav.ext.page.requests import ClosingChange, Favour, Find
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.planning import Profile
 
 # The profiles, and what is out of order until it is opened again.
 

@@ -8,27 +8,24 @@ import logging
 import tempfile
 import threading
 import time
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.files import printable, replace_file
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import map_facts
+from hybridnav.ext.page.requests import PartQuery, PlanQuery
+from hybridnav.ext.page.session import Session
+from hybridnav.ext.page.site import Site
 from hybridnav.ext.page.tiles import TILE, MapLayer, Theme, hex_colours, map_layer
 from hybridnav.graphs import build_lane_graph
 from hybridnav.graphs.files import export_nav2
 from hybridnav.guide.words import languages
+from hybridnav.maps import OccupancyGrid
 from hybridnav.models import export_path, export_rooms, save
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.ext.page.requests import PartQuery, PlanQuery
-    from hybridnav.ext.page.session import Session
-    from hybridnav.ext.page.site import Site
-    from hybridnav.maps import OccupancyGrid
 
 _NAMES = (
     *("texts.js", "scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js"),

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.fleet import BuildingPlan
 from hybridnav.guide.words import Instruction, sentences
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.planning import PlanResult
 from hybridnav.rooms.files.outlines import Outlines
 from hybridnav.rooms.files.paint import cells_inside
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.ext.fleet import BuildingPlan
 
 _FAR = 1e7
 """Grid units beyond which nothing lies: a map has fewer cells."""

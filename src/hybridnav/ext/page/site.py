@@ -18,7 +18,7 @@ from hybridnav.ext.page.requests import facts_of, finite, in_grid, in_metres, li
 from hybridnav.ext.page.session import Session
 from hybridnav.guide import Tour
 from hybridnav.models import Model
-from hybridnav.planning import PROFILES, load_preset, preset_names
+from hybridnav.planning import PROFILES, HybridPlanner, load_preset, preset_names
 from hybridnav.rooms import Rooms, find_rooms
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from hybridnav.ext.fleet.files.entries import EndEntry, LinkEntry
     from hybridnav.ext.page.drawing import PagePlanning
     from hybridnav.ext.page.requests import AlternativesQuery, PartQuery, PathQuery, PlanQuery
-    from hybridnav.planning import HybridPlanner
 
 _MOST_DIGITS = 3
 _NO_FILE = (

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import io
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from matplotlib import colormaps
 from PIL import Image
 
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.maps.costs import CostLayer
+from hybridnav.pyramid import Level
 from hybridnav.viz import style
 from hybridnav.viz.places import colour_vertices
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.pyramid import Level
 
 Theme = Literal["light", "dark"]
 

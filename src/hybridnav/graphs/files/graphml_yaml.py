@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.parsers import expat
 
 from hybridnav._base.trig import atan2, cos, sin
@@ -14,9 +15,6 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.graphs.files.xml_reader import XmlReader
 from hybridnav.graphs.gather import Gathered, number_of, pair_of, point_of
 from hybridnav.graphs.waypoint_graph import WaypointGraph
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 LIMITS = Limits(max_bytes=2**25, max_values=300_000, aliases=True)
 """How much of a file is read; a map of 90 nodes has 11,000 values."""

@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav.errors import MapError
 from hybridnav.graphs.files import nav2_rules as rules
 from hybridnav.graphs.gather import Gathered, edge_text, name_of, pair_of, point_of, shown
 from hybridnav.graphs.waypoint_graph import WaypointGraph
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _LINES = ("LineString", "MultiLineString")
 _OF_NODE = ("id",)

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 from hybridnav._base.files import NewFile
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs import RouteGraph, WaypointGraph
 from hybridnav.graphs.files import nav2_rules as rules
 from hybridnav.graphs.lanes import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import PathLike
 
 
 def export_nav2(graph: RouteGraph | WaypointGraph, path: PathLike, *, frame: str = "map") -> None:

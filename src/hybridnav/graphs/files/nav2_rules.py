@@ -10,15 +10,13 @@ from __future__ import annotations
 import json
 import math
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.graphs.gather import number_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOST_ID = 2**32 - 1
 """Nav2 holds ids as unsigned integers of 32 bits."""

@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.moves import legal_moves, length_in_cells, path_length_in_cells, trace
 from hybridnav._base.threads import Pool
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines import kernels as _kernels
 from hybridnav.harness.baselines.regions import Cell, CostClaim, MethodResult, array_bytes
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
 from hybridnav.search.grid_search import GridSearch
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
 
 
 class GridAstar:

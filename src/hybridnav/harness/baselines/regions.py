@@ -5,25 +5,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
+from hybridnav.pyramid import Level
 from hybridnav.route.coarse import ArcSearch, Beside, along
 from hybridnav.search.grid_search import GridSearch
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import Level
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 
 @copies_alike

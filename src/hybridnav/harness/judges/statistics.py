@@ -7,19 +7,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import TOLERANCE
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray, LongArray
-
 
 Interval = tuple[float, float]
 _CHUNK = 2_000_000

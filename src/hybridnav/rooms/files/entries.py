@@ -9,22 +9,19 @@ import binascii
 import lzma
 import math
 import zlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
 
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav._base.yaml_file import Limits, Marked
 from hybridnav.errors import InvalidValueError, RoomsError, brief
 from hybridnav.maps import NO_ROOM, OccupancyGrid, OneWayRule, RoomUse
 from hybridnav.maps.names import check_number
 from hybridnav.maps.occupancy import extent
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
 # --- cells that outlines miss ---------------------------------------------------------------------
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
-
-if TYPE_CHECKING:
-    from hybridnav.maps.room_labels import Point
+from hybridnav.maps.room_labels import Point
 
 
 @dataclass(frozen=True)

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 from scipy import ndimage
+from shapely import LineString
+from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
 from hybridnav.maps.clearance import closing
 from hybridnav.rooms.files.straight import straightened
-
-if TYPE_CHECKING:
-    from shapely import LineString
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-
 
 _SLACK = 1.02
 """Steps of a cell are within a tolerance of a cell, whatever the rounding."""
@@ -44,7 +40,8 @@ class Outlines:
         # Loads scipy and numba.
         from hybridnav.rooms.cutting import wall_directions  # noqa: PLC0415
 
-        region_of = regions_of(label_of, grid)
+        is_kept = _kept_cells(label_of, grid)
+        region_of = _without_bays(_without_islands(label_of, is_kept, grid), is_kept, grid)
         self._grid = grid
         self._steps = Borders.of(region_of, n_rooms)
         self._borders = self._steps.without_short(_SHORT_M / grid.resolution_m)
@@ -120,15 +117,6 @@ _SQUARE_M = 0.02
 _LARGEST_ISLAND_M2 = 4.0
 """Area of furniture and pillars inside rooms; larger islands keep an outline."""
 _LEAST_NAMELESS_M2 = 1.0
-
-
-def regions_of(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
-    """Return rooms grown over furniture, pillars, and narrow bays in walls, int32 (rows, cols).
-
-    `label_of`: int32 (rows, cols), -1 for no room. Every room has a free cell.
-    """
-    is_kept = _kept_cells(label_of, grid)
-    return _without_bays(_without_islands(label_of, is_kept, grid), is_kept, grid)
 
 
 def _kept_cells(label_of: IntArray, grid: OccupancyGrid) -> BoolArray:

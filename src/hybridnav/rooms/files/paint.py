@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.rows import in_runs, unique_rows
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import RoomsError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
 from hybridnav.rooms.files.entries import NAMELESS, Missed, Outline, Read, Runs
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 
 _MOST_PAINTED = 4
 """Most times that outlines may cover the map."""

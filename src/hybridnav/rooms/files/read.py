@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import IntArray, PathLike
 from hybridnav._base.yaml_file import read_marked
 from hybridnav.errors import (
     InvalidValueError,
@@ -20,6 +22,7 @@ from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.files.image import read_raster
 from hybridnav.maps.names import check_names
 from hybridnav.maps.occupancy import extent
+from hybridnav.maps.room_labels import Point
 from hybridnav.rooms.files.entries import (
     LIMITS,
     Outline,
@@ -32,12 +35,6 @@ from hybridnav.rooms.files.entries import (
     unpacked,
 )
 from hybridnav.rooms.files.paint import cells_inside, painted, without_slivers
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from hybridnav._base.typing import IntArray, PathLike
-    from hybridnav.maps.room_labels import Point
 
 
 def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import atan2, cos, hypots, sin
 from hybridnav._base.trig import directions as directions_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 _FARTHEST_M = 0.05
 """How far a corner moves at most to bring sides into line, in each of two directions."""

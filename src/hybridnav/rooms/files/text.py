@@ -5,26 +5,22 @@ from __future__ import annotations
 import itertools
 import re
 from bisect import bisect_right
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import yaml
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import PathLike
 from hybridnav._base.yaml_file import Marked, read_marked
 from hybridnav.errors import HybridNavError, RoomsError
+from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.rooms.files.entries import LIMITS, Outline, Read, read_entries, unpacked
 from hybridnav.rooms.files.measures import measures_of
 from hybridnav.rooms.files.read import rooms_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-
 
 HEADER = (
     "# Rooms of {}: outlines in metres, map frame, [x, y].",

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import yaml
 
 from hybridnav._base.files import printable, replace_file
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, PathLike
 from hybridnav.errors import InvalidValueError, RoomsError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.maps.checks import checked_type
+from hybridnav.maps.room_labels import Point
 from hybridnav.rooms.files.entries import LIMITS, Outline, Read, fingerprint, in_cells, packed
 from hybridnav.rooms.files.outlines import Outlines, decimals_of
 from hybridnav.rooms.files.paint import apart, by_rule, outlined
 from hybridnav.rooms.files.read import check_points, check_rooms, labels_of
 from hybridnav.rooms.files.text import HEADER, NOTES, OldText, scalar
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, PathLike
-    from hybridnav.maps.room_labels import Point
 
 _MOST_BYTES = 20_000
 """Size of a file above which coarser outlines are tried: more than a person edits."""

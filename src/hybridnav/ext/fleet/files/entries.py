@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import PathLike
 from hybridnav._base.yaml_file import Limits, Marked, read_marked
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.ext.fleet import LinkKind
 from hybridnav.maps import OneWayRule
 from hybridnav.planning import Profile
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import PathLike
 
 MOST_FLOORS = 99
 """Most floors of a building."""

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.files import printable
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.typing import PathLike
 from hybridnav._base.yaml_file import parse_document, read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.ext.fleet import Building, BuildingGraph, DoorLine, FloorArea, FloorGraph, Link
@@ -28,14 +30,9 @@ from hybridnav.graphs.files import json_graphs as graph_json
 from hybridnav.graphs.lanes import edge_metadata, node_metadata
 from hybridnav.maps.checks import checked_type
 from hybridnav.refine import Sight
+from hybridnav.rooms import Door, Rooms
 from hybridnav.rooms.find import outside_of
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.rooms import Door, Rooms
 
 _MOST_XML = 2**26
 """Most bytes of GraphML, and of XML that turns out to be another format."""

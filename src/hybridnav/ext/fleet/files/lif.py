@@ -5,13 +5,15 @@ from __future__ import annotations
 import itertools
 import json
 from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.files import NewFile
+from hybridnav._base.typing import PathLike
 from hybridnav._version import __version__
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
+from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, LinkKind, join_links
 from hybridnav.ext.fleet.files import rmf_read as rmf
 from hybridnav.ext.fleet.files.rmf_write import speed_limit_of
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
@@ -19,12 +21,6 @@ from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.files.json_graphs import json_errors
 from hybridnav.graphs.gather import Gathered, pair_of, shown
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.ext.fleet import LinkKind
 
 Point = tuple[float, float]
 _MOST_BYTES, _MOST_VALUES = 3 * 2**24, 2**22

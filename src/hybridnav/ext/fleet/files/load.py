@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import PathLike
 from hybridnav._base.yaml_file import parse_document
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
+from hybridnav.ext.fleet import BuildingGraph
 from hybridnav.ext.fleet.files import graphs as floors
 from hybridnav.ext.fleet.files.rmf_read import is_rmf
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.files import graphml_yaml as graph_yaml
 from hybridnav.graphs.files.json_graphs import read_json_graph
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import PathLike
-    from hybridnav.ext.fleet import BuildingGraph
 
 _TEXTS = (".yaml", ".yml", ".tmap", ".tmap2", ".tplg", ".tpl")
 _KNOWN = (

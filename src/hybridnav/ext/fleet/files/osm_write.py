@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 from xml.sax.saxutils import quoteattr
 
 import shapely
 
 from hybridnav._base.files import NewFile
-from hybridnav.ext.fleet import BuildingGraph, join_links
+from hybridnav._base.typing import FloatArray, PathLike
+from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, join_links
 from hybridnav.ext.fleet.files.osm_xml import Anchor
 from hybridnav.ext.fleet.files.rmf_write import speed_limit_of
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
 from hybridnav.graphs.gather import number_of
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav._base.typing import FloatArray, PathLike
-    from hybridnav.ext.fleet import FloorGraph, Link
 
 _DECIMALS = 11
 """Decimals of degrees: a micrometre. OpenStreetMap itself keeps 7, a centimetre."""

@@ -8,18 +8,15 @@ import math
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 import numpy as np
 
 from hybridnav._base.trig import cos, sin
 from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.ext.fleet import LinkKind
 from hybridnav.graphs.files.xml_reader import _HEAD, _MOST_LEVELS, MOST_BYTES, XmlReader
 from hybridnav.graphs.gather import number_of, pair_of, shown
-
-if TYPE_CHECKING:
-    from hybridnav.ext.fleet import LinkKind
 
 # From metres to latitude and longitude, and back.
 

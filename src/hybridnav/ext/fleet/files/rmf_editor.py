@@ -8,22 +8,18 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
 from hybridnav._base.trig import cos, dist, hypot, sin
 from hybridnav.errors import MapError
-from hybridnav.ext.fleet import DoorLine
+from hybridnav.ext.fleet import BuildingGraph, DoorLine
 from hybridnav.ext.fleet.files import rmf_read as rmf
 from hybridnav.graphs.gather import number_of, pair_of, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from hybridnav.ext.fleet import BuildingGraph
 
 _OPTIONS = 4
 """Place of the options of a vertex: x, y, z and name stand before."""

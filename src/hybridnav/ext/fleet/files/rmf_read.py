@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav.errors import MapError
 from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorGraph, Link, LinkEnd
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Gathered, pair_of, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
 
 MOST_FLOORS, MOST_LINKS = 1000, 1000
 """Most levels of a file, and most links between them."""

@@ -5,22 +5,18 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.files import NewFile
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.fleet import BuildingGraph, join_links
+from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
 from hybridnav.ext.fleet.link_nodes import nodes_of_link
 from hybridnav.graphs.gather import free_name, number_of, quoted
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.ext.fleet import FloorGraph, Link, LinkEnd
 
 ALIGNED_M = 0.1
 """Most metres between the ends of a lift on two floors: Open-RMF refuses more."""

@@ -4,24 +4,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.live.explore.goals import Goals
 from hybridnav.ext.live.explore.robot import Robot, laser_all_round
+from hybridnav.ext.live.mapping import SimulatedLaser
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_whole
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.ext.live.explore.goals import Goals
-    from hybridnav.ext.live.mapping import SimulatedLaser
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 By = Literal["path", "frontier", "room"]
 """How goals are ranked."""

@@ -6,22 +6,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from hybridnav._base.moves import legal_moves, length_in_cells
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.search.grid_search import costs_from
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True, eq=False)

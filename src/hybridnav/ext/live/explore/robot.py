@@ -6,27 +6,24 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav._base.moves import legal_moves, length_in_cells
 from hybridnav._base.trig import atan2, hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms
 from hybridnav.ext.live.explore import goals as plans
 from hybridnav.ext.live.mapping import LaserModel, Mapper, SimulatedLaser
+from hybridnav.ext.live.mapping.mapper import Area
 from hybridnav.ext.live.mapping.sensors import in_sight
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.planning import HybridPlanner
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import costs_from
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.ext.live.mapping.mapper import Area
 
 _SCAN_EVERY_M = 0.5
 _NEAR_M = 0.5

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.errors import InvalidValueError, MapError, MapWarning
 from hybridnav.ext.live.files import bag_files
 from hybridnav.ext.live.files.bag_files import check_rosbags
@@ -24,11 +26,6 @@ from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_between, checked_radius, checked_thresholds, checked_type
 from hybridnav.messages import number_of, stamp_ns_of, value_of
 from hybridnav.planning import PlanResult
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import FloatArray, PathLike
 
 _MOST_TILT_RAD = 0.1
 """Angle between the vertical and the axis of a laser up to which its scans count as level."""

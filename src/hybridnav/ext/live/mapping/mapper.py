@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.trig import cos, sin
+from hybridnav._base.typing import IntArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import (
     BeamLimits,
@@ -21,13 +22,7 @@ from hybridnav.ext.live.mapping.sensors import MOST_RANGE_CELLS, LaserModel, log
 from hybridnav.maps import DEFAULT_MAX_CELLS, MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type, checked_whole
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import IntArray
-
-    Area = tuple[float, float, float, float]
-
+Area = tuple[float, float, float, float]
 _MARGIN_CELLS = 64
 """Cells beyond a scan by which extents grow at least, so that not every scan makes them grow."""
 _NO_LIMIT = 1e-300

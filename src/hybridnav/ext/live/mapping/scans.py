@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.frame import FARTHEST_M
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray
 
 _MOST_TURN_RAD = 100.0
 

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import log, sines_and_cosines
+from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live.mapping.kernels import ray_lengths
 from hybridnav.ext.live.mapping.scans import MOST_READINGS, LaserScan, checked_number
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type, checked_whole
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray
 
 MOST_RANGE_CELLS = 2**14
 """Cells of a beam that are walked exactly in int64."""
