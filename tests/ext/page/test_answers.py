@@ -184,3 +184,30 @@ def test_files_are_those_of_the_library(client: Client, folder: Path, tmp_path: 
     model.write_bytes(client.post("export/model", None).body)
     assert hn.load(model).rooms is not None
     assert sorted(file.name for file in folder.iterdir()) == before
+
+
+def test_a_door_is_passed_into_the_room_that_its_arrow_points_to(client: Client) -> None:
+    facts = client.get("floor/0/map.json").value["rooms"]
+    label_of, doors = client.session.planning.topology.rooms.labels, facts["doors"]
+    assert facts["one_way"] == []
+    for door in doors:
+        at, ahead = np.array(door["at"]), np.array(door["ahead"])
+        assert np.abs(ahead).sum() > 0.5
+        points = client.session.grid.frame.points_of_grid(
+            np.array([at - ahead, at + ahead])[:, ::-1]
+        )
+        found = [label_of.at((x, y), client.session.grid) for x, y in points.tolist()]
+        assert found == door["rooms"]
+
+    def planned(into: int) -> Any:
+        rules = [f"door:{door['number']}={door['rooms'][into]}" for door in passed]
+        asked = QUERY | {"closed": {"floors": [{"floor": 0, "one_way": rules}]}}
+        return client.post("plan", asked).value
+
+    plain = client.post("plan", QUERY).value
+    numbers = [leg["door"] for leg in plain["legs"] if leg["door"] is not None]
+    rooms = [leg["room"] for leg in plain["legs"]]
+    passed = [door for door in doors if door["number"] in numbers[:1]]
+    ahead = passed[0]["rooms"].index(rooms[1])
+    assert planned(ahead)["length_m"] == plain["length_m"]
+    assert planned(1 - ahead)["length_m"] != plain["length_m"]
