@@ -6,21 +6,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
+from numpy.typing import ArrayLike
+
+from hybridnav.closures.blocked import Closable
 from hybridnav.errors import InvalidValueError
 from hybridnav.guide.by_doors import Chosen, DoorTours, RouteLimits
 from hybridnav.guide.tour import Tour, plan_tour
 from hybridnav.maps.checks import checked_whole
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.planning import Path, PlanResult
-    from hybridnav.planning.named import At
-    from hybridnav.planning.planner import HybridPlanner
-
+from hybridnav.planning import Path, PlanResult
+from hybridnav.planning.named import At
+from hybridnav.planning.planner import HybridPlanner
 
 MOST = 20
 """Most alternatives of one query."""

@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TypeGuard
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
+from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from hybridnav.guide.tour import tour_of
-from hybridnav.maps.costs import cost_along
-from hybridnav.route import RouteFinder, door_graph
+from hybridnav._base.typing import BoolArray, LongArray
+from hybridnav.guide.tour import Tour, tour_of
+from hybridnav.guide.words.bends import Leg
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.costs import CostLayer, cost_along
+from hybridnav.planning import PlanResult
+from hybridnav.planning.planner import HybridPlanner
+from hybridnav.rooms import Door
+from hybridnav.route import DoorGraph, DoorRoute, RouteFinder, door_graph
 from hybridnav.search.found import ClosedCells
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import BoolArray, LongArray
-    from hybridnav.guide.tour import Tour
-    from hybridnav.guide.words.bends import Leg
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlanResult
-    from hybridnav.planning.planner import HybridPlanner
-    from hybridnav.rooms import Door
-    from hybridnav.route import DoorGraph, DoorRoute
 
 
 def _least_bound(whole: PlanResult, cost_m: float) -> float:

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from numpy.typing import ArrayLike
+
+from hybridnav.closures.blocked import Closable
 from hybridnav.errors import InvalidValueError
-from hybridnav.guide.words import sentences
+from hybridnav.guide.words import Instruction, sentences
+from hybridnav.guide.words.bends import Leg
 from hybridnav.guide.words.itinerary import guide_of, heading_of, waypoint_text
-from hybridnav.planning import PlanStatus
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.guide.words import Instruction
-    from hybridnav.guide.words.bends import Leg
-    from hybridnav.planning import Metric, PlanResult
-    from hybridnav.planning.named import At
-    from hybridnav.planning.planner import HybridPlanner
-    from hybridnav.planning.planning import Smooth
-    from hybridnav.search.found import ClosedCells
+from hybridnav.planning import Metric, PlanResult, PlanStatus
+from hybridnav.planning.named import At
+from hybridnav.planning.planner import HybridPlanner
+from hybridnav.planning.planning import Smooth
+from hybridnav.search.found import ClosedCells
 
 _COUNTS = ("expanded", "expanded_places", "expanded_intervals", "corridor_cells")
 

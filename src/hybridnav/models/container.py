@@ -19,21 +19,18 @@ import mmap
 import os
 import struct
 import zlib
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hybridnav._base.files import printable, replace_file
+from hybridnav._base.typing import AnyArray, PathLike
 from hybridnav._version import __version__
 from hybridnav.errors import MapNotFoundError, ModelError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from hybridnav._base.typing import AnyArray, PathLike
 
 FORMAT = 1
 """Version of the layout that is written, and the only one that is read."""

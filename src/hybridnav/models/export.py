@@ -10,25 +10,21 @@ import io
 import itertools
 import json
 import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.files import printable, replace_file
+from hybridnav._base.typing import FloatArray, PathLike, SignArray
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.guide import Tour
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
 from hybridnav.planning import PlanResult
-from hybridnav.rooms import Rooms
+from hybridnav.rooms import Door, Rooms
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from hybridnav._base.typing import FloatArray, PathLike, SignArray
-    from hybridnav.rooms import Door
 
 _DECIMALS = 6
 _TABLE, _FEATURES, _PLAIN = ".csv", (".geojson",), ".json"

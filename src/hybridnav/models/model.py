@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import ModelError
-from hybridnav.maps import DEFAULT_MAX_CELLS, OccupancyGrid
+from hybridnav.maps import DEFAULT_MAX_CELLS, OccupancyGrid, RoomLabels
+from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.files import load_map
 from hybridnav.maps.files.limits import check_max_cells
 from hybridnav.models import parts, structures
-from hybridnav.models.container import read_parts
-from hybridnav.planning import Preset, PyramidSettings, load_preset
+from hybridnav.models.container import FiledPart, Part, read_parts
+from hybridnav.planning import HybridPlanner, Preset, PyramidSettings, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.maps import RoomLabels
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.models.container import FiledPart, Part
-    from hybridnav.planning import HybridPlanner
 
 
 class Model:

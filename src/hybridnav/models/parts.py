@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from hybridnav._base.typing import AnyArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import Frame, OccupancyGrid, OneWayRule, RoomLabels, RoomUse
 from hybridnav.maps.files.limits import check_size
 from hybridnav.maps.islands import DroppedIslands
+from hybridnav.models.container import FiledPart, Part
 from hybridnav.models.structures import GRID, PRESET, PYRAMID, ROOMS, refusal
 from hybridnav.planning import Preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import MAX_LEVELS, SURVIVES, BuildStats, LevelSize, Linkage, Record
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray
-    from hybridnav.models.container import FiledPart, Part
 
 _PALETTE = 256
 _COUNT = Annotated[int, Field(ge=0)]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
+from hybridnav._base.typing import IntArray, LongArray
+from hybridnav.models.container import FiledPart, Part
 from hybridnav.models.parts import values_of
 from hybridnav.models.structures import (
     CORNER_EDGES,
@@ -16,18 +19,11 @@ from hybridnav.models.structures import (
     MESH,
     refusal,
 )
+from hybridnav.planning import PlannerSettings
 from hybridnav.search import mesh as meshes
 from hybridnav.search import octile as jumps
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import IntArray, LongArray
-    from hybridnav.models.container import FiledPart, Part
-    from hybridnav.planning import PlannerSettings
-    from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-    from hybridnav.search.octile import JumpSearch
-
+from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+from hybridnav.search.octile import JumpSearch
 
 _FRAME = 2
 """Rows and columns of the frame of blocked cells round a jump-point graph."""

@@ -8,20 +8,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import AnyArray
 from hybridnav.errors import ModelError
 from hybridnav.maps.cells import MAX_CELLS
-from hybridnav.models.container import Part
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from hybridnav._base.typing import AnyArray
-    from hybridnav.models.container import FiledPart
-
+from hybridnav.models.container import FiledPart, Part
 
 # Descriptions of the structures of a model: arrays, with their valid shapes and values.
 #

@@ -5,13 +5,15 @@ share.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.clock import clock
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, KeyArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap
+from hybridnav.pyramid.darts import Steering
 from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels import darts as dart_kernels
 from hybridnav.pyramid.kernels import decimation as _kernels
@@ -21,10 +23,6 @@ from hybridnav.pyramid.kernels.decimation import Hulls
 from hybridnav.pyramid.kernels.hulls import hulls_of_points
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize
 from hybridnav.pyramid.start import N_CLASSES, Start
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, KeyArray
-    from hybridnav.pyramid.darts import Steering
 
 
 @dataclass

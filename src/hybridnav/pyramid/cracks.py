@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.pyramid.kernels.fields import edges_to_rim, find_cracks
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-
 
 __all__ = [
     "boundaries_of",

@@ -4,15 +4,12 @@ contracted above the places, and in which order.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable
+from typing import Protocol
 
+from hybridnav._base.typing import IntArray, LongArray
 from hybridnav.pyramid.kernels.darts import Darts
 from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX, Vertices
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import IntArray, LongArray
 
 __all__ = ["WORST_RANK", "Darts", "Resists", "Steering"]
 

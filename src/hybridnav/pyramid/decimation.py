@@ -13,25 +13,22 @@ one field. So the record stays valid outside a set of fields that are dissolved.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.clock import clock
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+from hybridnav.pyramid import CombinatorialMap
 from hybridnav.pyramid.contraction import NO_LIMIT, Decimation, Window
+from hybridnav.pyramid.darts import Darts, Resists
 from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels.decimation import ATTRIBUTE_MAX, Vertices
+from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, Linkage, Record
 from hybridnav.pyramid.start import Start, kinds_of, parts_of, start_at_base, start_at_level
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import CombinatorialMap
-    from hybridnav.pyramid.darts import Darts, Resists
-    from hybridnav.pyramid.level import Level
 
 KERNEL = _kernels.select_stars
 """The kernel whose compiled form shows that a pyramid was built before."""

@@ -6,14 +6,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.typing import ByteArray, IntArray, LongArray
 from hybridnav.maps import CellClass, OccupancyGrid
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray, IntArray, LongArray
 
 RIM = 0
 """Label of the occupied ring round the map and of every obstacle that touches it."""

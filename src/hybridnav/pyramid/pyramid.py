@@ -2,32 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, overload
+from typing import overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from hybridnav._base.typing import IntArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.pyramid.islands import LazyIslands
+from hybridnav.maps import OccupancyGrid, RoomLabels
+from hybridnav.pyramid.darts import Resists
+from hybridnav.pyramid.islands import Islands, LazyIslands
 from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.record import (
+    BuildStats,
+    Linkage,
+    Record,
     check_fit,
     checked_most_cells,
     checked_settings,
     checked_vertices,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.pyramid.darts import Resists
-    from hybridnav.pyramid.islands import Islands
-    from hybridnav.pyramid.record import BuildStats, Linkage, Record
 
 
 @dataclass(frozen=True, eq=False)

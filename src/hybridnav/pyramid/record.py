@@ -5,21 +5,17 @@ from __future__ import annotations
 import math
 import operator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
+from hybridnav.maps import OccupancyGrid, RoomLabels
+from hybridnav.pyramid.darts import Resists
 from hybridnav.pyramid.kernels.fields import field_extents, label_fields, level_sizes
 from hybridnav.pyramid.kernels.hulls import field_hulls, hull_distances
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.pyramid.darts import Resists
-
 
 Linkage = Literal["throats", "survivor", "radius", "diameter"]
 """Rules for the distance that must be below U_d where two fields merge."""

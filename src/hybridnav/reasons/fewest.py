@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import heapq
 from collections import defaultdict
+from collections.abc import Iterable
 from itertools import count
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from hybridnav._base.rows import unique_rows
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from hybridnav._base.typing import BoolArray, LongArray
+from hybridnav._base.typing import BoolArray, LongArray
 
 Name = TypeVar("Name")
 _MOST_REPEATED = 10

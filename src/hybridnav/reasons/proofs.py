@@ -8,16 +8,22 @@ import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.moves import COL_STEP, ROW_STEP
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.check_proof import ONE, UNIT, cost_of, joins_of
 from hybridnav.errors import PlanError
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.cells import CellClass
 from hybridnav.maps.clearance import within_radius
+from hybridnav.planning import PlanResult
+from hybridnav.planning.costs import PlannerCosts
+from hybridnav.search.directed import DirectedSides
+from hybridnav.search.found import ClosedCells
 from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.slits import lines_of
 from hybridnav.search.proofs import (
@@ -27,14 +33,6 @@ from hybridnav.search.proofs import (
     region_of,
     strings_near,
 )
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning import PlanResult
-    from hybridnav.planning.costs import PlannerCosts
-    from hybridnav.search.directed import DirectedSides
-    from hybridnav.search.found import ClosedCells
 
 _RATIO = math.sqrt(4 - math.sqrt(8))
 """Most by which moves between corners of cells are dearer than a line."""

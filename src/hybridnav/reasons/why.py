@@ -5,36 +5,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.closures import Blocked
 from hybridnav.closures.blocked import Closable, as_blocked
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.widest import Bottleneck, WidestPaths
-from hybridnav.planning import PlanStatus
+from hybridnav.planning import HybridPlanner, PlanStatus
 from hybridnav.planning.endpoints import places_of_endpoints
+from hybridnav.planning.planning import Planning
 from hybridnav.pyramid import LevelArc
 from hybridnav.reasons.fewest import OpenGround, fewest_to_open
 from hybridnav.reasons.why_words import BlockedEnd, Closure, TightPlace, sentences
 from hybridnav.rooms import Door
+from hybridnav.search.directed import DirectedSides
 from hybridnav.search.found import ClosedCells
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning import HybridPlanner
-    from hybridnav.planning.planning import Planning
-    from hybridnav.search.directed import DirectedSides
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,16 +5,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 from hybridnav.guide.words import check_language
 from hybridnav.planning import PlanStatus
+from hybridnav.rooms import Door
 from hybridnav.rooms.listing import FOUND_NAME
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav.rooms import Door
 
 
 class Closure(NamedTuple):

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from copy import copy
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.poses import wrapped
+from hybridnav._base.typing import AnyArray, FloatArray, LongArray
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.costs import CostLayer
 from hybridnav.refine.grid import open_cells
 from hybridnav.refine.kernels import cost_line as kernels
 from hybridnav.refine.kernels.arcs import round_bends
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
 
 _SPARE = 0.005
 """Most that arcs may add to the cost of a line, as a part of it."""

@@ -7,17 +7,14 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import atan2, cos, sin, sines_and_cosines
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.refine.kernels.curves import shortest_word
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.refine.motions import MotionCheck
+from hybridnav.refine.motions import MotionCheck
 
 Pose = tuple[float, float, float]
 """`(x, y, yaw)`, metres and radians, map frame."""

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError, brief
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray
 
 MAX_CORNERS = 1000
 """Most corners of a footprint."""

@@ -7,24 +7,22 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.costs import CostLayer
 from hybridnav.refine.kernels import line_of_sight as kernels
 from hybridnav.refine.kernels.line_of_sight import clear_segments
 from hybridnav.refine.kernels.taut import marks_of
+from hybridnav.route import Corridor
+from hybridnav.search.found import ClosedCells
 from hybridnav.search.grid_search import Cell, GridSearch
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.route import Corridor
-    from hybridnav.search.found import ClosedCells
 
 
 def open_cells(grid: OccupancyGrid, *closed: LongArray | None, allow_unexplored: bool) -> BoolArray:

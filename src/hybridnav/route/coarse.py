@@ -5,18 +5,16 @@ search of the topological map by it; and the corridor along its route.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass
 from hybridnav.route.kernels import arcs as _kernels
 from hybridnav.route.route import Corridor
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 Beside = Literal["route", "joined", "neighbours"]
 """Which places beside a route belong to its corridor; see `corridor_of`."""

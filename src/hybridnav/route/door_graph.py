@@ -6,23 +6,20 @@ Routes that differ are found as on road networks: a shortest one to every door, 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from hybridnav._base.moves import STRAIGHT, length_in_cells
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps.costs import UNIT_BITS, CostLayer
 from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
+from hybridnav.rooms import Rooms
 from hybridnav.route.room_fields import RoomFields
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.rooms import Rooms
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,13 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, on_demand
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.rooms import Rooms
-    from hybridnav.topology import TopologicalMap
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
+from hybridnav.rooms import Rooms
+from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True)

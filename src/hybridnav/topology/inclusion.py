@@ -10,19 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
+from hybridnav.pyramid import Level
 from hybridnav.pyramid.graphs import FaceKind
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.pyramid import Level
-    from hybridnav.pyramid.islands import Islands
-
+from hybridnav.pyramid.islands import Islands
 
 _EAST = 0
 

@@ -14,7 +14,7 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
-from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid import DualGraphPyramid, Level
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import Level
     from hybridnav.pyramid.record import Linkage, Patch
     from hybridnav.rooms.level import Rooms
     from hybridnav.topology.inclusion import Enclosed, Inclusion

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.poses import wrapped
 from hybridnav._base.trig import atan2, directions, hypot, hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.guide.words import Space
 from hybridnav.guide.words.instruction import LEAST_BEND_RAD, Shape
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.planning import Path
-    from hybridnav.rooms import Door
+from hybridnav.planning import Path
+from hybridnav.rooms import Door
 
 
 @dataclass(frozen=True)

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import bisect
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import cos, sin
-from hybridnav.guide.words import Turn
-from hybridnav.guide.words.instruction import LEAST_BEND_RAD
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav.guide.words import Space, Wall
-    from hybridnav.guide.words.bends import Bend, Leg, Line
-    from hybridnav.guide.words.glances import Glance
-    from hybridnav.guide.words.instruction import Kind
-    from hybridnav.guide.words.landmarks import Landmarks
-    from hybridnav.rooms import Door
+from hybridnav.guide.words import Space, Turn, Wall
+from hybridnav.guide.words.bends import Bend, Leg, Line
+from hybridnav.guide.words.glances import Glance
+from hybridnav.guide.words.instruction import LEAST_BEND_RAD, Kind
+from hybridnav.guide.words.landmarks import Landmarks
+from hybridnav.rooms import Door
 
 _SLIVER_M = 1.0
 """Length of a leg outside rooms that is not mentioned, as across a gap between two outlines."""

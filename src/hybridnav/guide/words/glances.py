@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import atan2, cos, dist, hypots, sin
+from hybridnav._base.typing import BoolArray, FloatArray
+from hybridnav.guide.words.bends import Line
+from hybridnav.guide.words.instruction import Hand, Side
 from hybridnav.maps import CellClass
+from hybridnav.rooms import Door, Rooms
 from hybridnav.rooms.listing import FOUND_NAME
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.guide.words.bends import Line
-    from hybridnav.guide.words.instruction import Hand, Side
-    from hybridnav.rooms import Door, Rooms
 
 _LATERAL_M = 3.5
 """Distance from the path at which a door counts as passed, at most."""

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from hybridnav.guide.words import Doorway, Instruction, Turn
-from hybridnav.guide.words.bends import LEAST_SLIGHT_RAD, Line
+from hybridnav.guide.words.bends import LEAST_SLIGHT_RAD, Bend, Leg, Line
 from hybridnav.guide.words.events import (
+    Event,
+    Stretch,
     are_halves,
     events_of,
     stretches_of,
@@ -17,16 +19,9 @@ from hybridnav.guide.words.events import (
     without_slivers,
 )
 from hybridnav.guide.words.glances import Look
-from hybridnav.guide.words.instruction import LEAST_BEND_RAD
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav.guide.words.bends import Bend, Leg
-    from hybridnav.guide.words.events import Event, Stretch
-    from hybridnav.guide.words.instruction import Hand
-    from hybridnav.guide.words.landmarks import Landmarks
-    from hybridnav.planning import Path
+from hybridnav.guide.words.instruction import LEAST_BEND_RAD, Hand
+from hybridnav.guide.words.landmarks import Landmarks
+from hybridnav.planning import Path
 
 _KEPT_M = 5.0
 """Length up to which a person goes on in the direction of the door that was passed."""

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import LongArray
+from hybridnav.guide.words import Instruction
 from hybridnav.guide.words.bends import Leg
+from hybridnav.guide.words.instruction import Shape
 from hybridnav.guide.words.instructions import instructions_of as instructions_of_legs
 from hybridnav.guide.words.landmarks import Landmarks
+from hybridnav.planning import HybridPlanner, Path
+from hybridnav.rooms import Door, Rooms
 from hybridnav.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
 from hybridnav.route import RouteFinder
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import LongArray
-    from hybridnav.guide.words import Instruction
-    from hybridnav.guide.words.instruction import Shape
-    from hybridnav.planning import HybridPlanner, Path
-    from hybridnav.rooms import Door, Rooms
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 _SLIVER_M = 0.5
 _LEAST_ROOM_M2 = 6.0

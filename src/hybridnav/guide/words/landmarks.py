@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.poses import wrapped
 from hybridnav._base.trig import cos, directions, dist, hypots, sin
 from hybridnav.guide.words import Landmark, Space, Wall
+from hybridnav.guide.words.bends import Line
 from hybridnav.guide.words.glances import (
     FEW,
     MANY,
@@ -20,15 +21,10 @@ from hybridnav.guide.words.glances import (
     is_named,
     turn_to,
 )
+from hybridnav.guide.words.instruction import Hand, Side
 from hybridnav.guide.words.walls import RoomWalls
 from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
-    from hybridnav.guide.words.bends import Line
-    from hybridnav.guide.words.instruction import Hand, Side
-    from hybridnav.rooms import Door, Rooms
+from hybridnav.rooms import Door, Rooms
 
 _FARTHEST_M = 20.0
 """Distance at which a person recognises a door from the start, at most."""

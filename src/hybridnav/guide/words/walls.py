@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from hybridnav._base.trig import hypots
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.guide.words.instruction import Hand
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+from hybridnav.guide.words.instruction import Hand
 
 _STEPS = ((0, 1), (1, 0), (0, -1), (-1, 0))
 """From a cell to its neighbours, (row, col), counter-clockwise."""

@@ -10,21 +10,17 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import atan2, cos, hypot, hypots, sin
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.refine.ompl.attempts import Attempts, Simplifier, objective_of
+from hybridnav.refine.ompl.client import OmplQuery, Reply
 from hybridnav.refine.ompl.problem import Base, Box, SearchArea, bounds_of, search_area_of
 from hybridnav.refine.ompl.solve import IMPROVING, Problem, StateSpace, solve
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.refine.ompl.client import OmplQuery, Reply
 
 _WINDING, _SLACK_CELLS = 1.2, 4
 """A leg is cut in two if its path of cells is longer than this times the straight line plus so many

@@ -6,21 +6,17 @@ import itertools
 import math
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from ompl import base, geometric
 
 from hybridnav._base.trig import hypot, hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.refine.ompl.client import OmplQuery, Reply, Search
+from hybridnav.refine.ompl.problem import Base, SearchArea
 from hybridnav.refine.ompl.solve import StateSpace
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.refine.ompl.problem import Base, SearchArea
-
 
 _KEPT = 0.03
 """Share of the time reserved for the reply."""

@@ -15,20 +15,16 @@ import time
 import weakref
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.threads import start_module
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import OmplError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.refine.ompl import OmplSettings
-
+from hybridnav.maps import OccupancyGrid
+from hybridnav.refine.ompl import OmplSettings
 
 ReplyStatus = Literal["solved", "approximate", "timeout"]
 

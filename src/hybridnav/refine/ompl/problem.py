@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+from hybridnav.maps import OccupancyGrid
 from hybridnav.refine.motions import MotionCheck
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.refine.ompl.client import OmplQuery, Setup
-
+from hybridnav.refine.ompl.client import OmplQuery, Setup
 
 Box = tuple[int, int, int, int]
 """First and last row, first and last column of a box, the last ones exclusive."""

@@ -6,25 +6,22 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from ompl import base, geometric
 
 from hybridnav._base.trig import hypot, hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import OmplError
 from hybridnav.refine.curves import driven, shortest_curve
+from hybridnav.refine.motions import MotionCheck
+from hybridnav.refine.ompl import OmplSettings
+from hybridnav.refine.ompl.client import Search
 from hybridnav.refine.ompl.settings import PARAMETERS, REAL, ROADMAPS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.refine.motions import MotionCheck
-    from hybridnav.refine.ompl import OmplSettings
-    from hybridnav.refine.ompl.client import Search
 
 _STATES = {"r2": 2, "se2": 3, "differential": 3, "dubins": 3, "reeds-shepp": 3}
 FINE = 1e-4
