@@ -51,7 +51,7 @@ BUDGETS = {
     "refine": (6000, 9),
     "rooms": (5700, 9),
     "route": (1000, 6),
-    "search": (11750, 9),
+    "search": (11850, 9),
     "topology": (720, 6),
     "viz": (4850, 6),
 }

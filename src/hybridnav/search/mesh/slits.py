@@ -8,7 +8,7 @@ way back; paths may bend there where three cells in turn may be passed round it.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from hybridnav.search.mesh.kernels.corners import MANY
 from hybridnav.search.mesh.kernels.intervals import DIRECTED, LEFTWARD, RIGHTWARD
 from hybridnav.search.mesh.kernels.slits import DOWN, UP
 from hybridnav.search.mesh.kernels.state import Slits
-from hybridnav.search.mesh.search import MeshSearch
+from hybridnav.search.mesh.search import MeshPath, MeshSearch
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
@@ -35,6 +35,59 @@ _PAIR = 2
 """Sides at a point through which a line may go on."""
 _SLIVER_CELLS = 1e-9
 """Shorter segments of a line are rounding: the line passes the corner of a cell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Which polygons of a mesh with directed sides lead to which."""
+
+    part: IntArray
+    """int32 (p,), the set of polygons that lead to each other to which each belongs."""
+    ahead: dict[int, set[int]]
+    """The sets that each leads to; of those that lead to others alone."""
+
+    @classmethod
+    def of(cls, twins: IntArray, polygon_of: IntArray, n_polygons: int) -> Reach:
+        """Find the sets from the sides that may be crossed; `twins`: -1 for those that may not."""
+        from scipy import sparse  # noqa: PLC0415 - a quarter of a second that others do not need
+        from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+        slots = np.flatnonzero(twins >= 0)
+        ends = polygon_of[slots], polygon_of[twins[slots]]
+        graph = sparse.csr_array((np.ones(len(slots), np.int8), ends), (n_polygons, n_polygons))
+        _, part = connected_components(graph, directed=True, connection="strong")
+        ahead: dict[int, set[int]] = {}
+        for one, two in set(zip(*(part[of].tolist() for of in ends), strict=True)):
+            if one != two:
+                ahead.setdefault(one, set()).add(two)
+        for first, found in ahead.items():
+            waiting = list(found)
+            while waiting:
+                further = ahead.get(waiting.pop(), set()) - found - {first}
+                found.update(further)
+                waiting += further
+        return cls(part.astype(np.int32), ahead)
+
+    def leads(self, one: int, two: int) -> bool:
+        """Return whether a polygon leads to another."""
+        first, last = int(self.part[one]), int(self.part[two])
+        return first == last or last in self.ahead.get(first, ())
+
+
+class DirectedSearch(MeshSearch):
+    """The search of a mesh with directed sides: where there is no way, nothing is searched."""
+
+    reach: Reach
+
+    def path(self, cells: tuple[Cell, Cell], positions: Any, **how: Any) -> MeshPath:
+        """Find a shortest path between two positions; see `MeshSearch`."""
+        from hybridnav.search.mesh.kernels.ends import polygons_of_points  # noqa: PLC0415 - rare
+
+        at = np.array(cells)
+        offset, found = polygons_of_points(self.arrays, self.mesh.polygon_at, (at, at + 0.5))
+        if not self.reach.leads(found[0], found[offset[1]]):
+            return MeshPath(None, math.inf, math.inf, 0)
+        return super().path(cells, positions, **how)
 
 
 def slits_of(free: BoolArray, sides: IntArray) -> tuple[Slits, Seams]:
@@ -162,10 +215,11 @@ def directed_search(made: ConvexMesh, slits: Slits, ends: LongArray) -> MeshSear
     for array in (corners, kinds, new_begins):
         array.flags.writeable = False
     mesh = replace(made, corners=corners, kinds=kinds, begins=new_begins)
-    search = MeshSearch(mesh)
+    search = DirectedSearch(mesh)
     backs, twins = mesh.twins.copy(), np.where(is_shut, np.int32(-1), mesh.twins)
     backs[mesh.twins[is_shut & (mesh.twins >= 0)]] = -1
     backs.flags.writeable = twins.flags.writeable = False
+    search.reach = Reach.of(twins, mesh.polygon_of, mesh.n_polygons)
     search.arrays = mesh.arrays._replace(twins=twins, backs=backs)
     search.is_prepared = True  # edges between corners lead both ways
     return search
