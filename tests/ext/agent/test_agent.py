@@ -460,6 +460,13 @@ def test_what_is_out_of_order_is_closed_for_programs_too(tmp_path):
     assert not answers.call("nearest", {"of": goal, "start": point})["ok"]
     assert journal.open(f"room:{goal}")
     assert answers.call("route", ends)["status"] == "solved"
+    for door in topology.rooms.doors:
+        if goal in door.rooms and not door.is_gap:
+            other = door.rooms[door.rooms[0] == goal]
+            journal.close(f"one-way:door:{door.number}={other or ''}")
+    for name in ("route", "can_reach", "explain"):
+        assert "may be crossed only" in answers.call(name, ends)["text"]
+    assert answers.call("route", {"start": goal, "goal": point})["status"] == "solved"
 
 
 @pytest.mark.parametrize("of", ["map", "building"])
