@@ -35,6 +35,16 @@ def test_shortest_answers_many_pairs_and_tables_as_it_answers_each():
     assert (table != table.T).any()
 
 
+def test_a_time_limit_bars_no_direction():
+    free = np.ones((6, 8), bool)
+    one_way = hn.OneWay(sides=[(2, c, 3, c) for c in range(7)])
+    topology = planner_of(Scene(free, np.empty((0, 4), np.int32), []), "shortest").topology
+    preset = hn.load_preset("shortest", overrides=["planner.budget_s=1e-9"])
+    result = hn.HybridPlanner(topology, preset=preset).plan((4.5, 5.5), (4.5, 0.5), one_way=one_way)
+    assert result.path is not None
+    assert result.cost == pytest.approx(2 * np.hypot(2.5, 2.5))
+
+
 def test_sides_between_blocked_cells_change_nothing():
     free = np.ones((6, 8), bool)
     free[2, 1:7] = free[3, 1:7] = False

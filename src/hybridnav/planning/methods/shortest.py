@@ -141,10 +141,11 @@ class OverMesh(Method):
         reads them.
 
         When the preset's time is up, or if it has a time limit and the mesh is not built yet, the
-        answer is a cell path shortened by line of sight, with the proved bound.
+        answer is a cell path shortened by line of sight, with the proved bound; not where
+        directions bar the undirected path, which take the time that they need.
         """
         began, seconds = clock(), {}
-        if self._search is None and self._budget_s is None:
+        if self._search is None and (self._budget_s is None or query.one_way is not None):
             self._on_mesh()
             seconds["mesh"] = clock() - began
             began = clock()
@@ -179,6 +180,8 @@ class OverMesh(Method):
         detours = self._round(search, closed)
         if path.positions is not None and not detours.is_met_by(path):
             return path
+        if detours.is_directed:
+            left_s = None  # a path of cells in its place could be shortened across a side
         if left_s is not None:
             left_s = max(left_s - (clock() - began), 0.0)
         around = detours.search.path(query.cells, positions, epsilon=self._epsilon, budget_s=left_s)
