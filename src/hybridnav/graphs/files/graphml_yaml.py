@@ -10,9 +10,9 @@ from typing import Any
 from xml.parsers import expat
 
 from hybridnav._base.trig import atan2, cos, sin
+from hybridnav._base.xml_reader import XmlReader
 from hybridnav._base.yaml_file import Limits
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.graphs.files.xml_reader import XmlReader
 from hybridnav.graphs.gather import Gathered, number_of, pair_of, point_of
 from hybridnav.graphs.waypoint_graph import WaypointGraph
 

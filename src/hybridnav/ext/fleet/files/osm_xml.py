@@ -13,9 +13,9 @@ from xml.parsers import expat
 import numpy as np
 
 from hybridnav._base.trig import cos, sin
+from hybridnav._base.xml_reader import MOST_BYTES, XmlReader
 from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import LinkKind
-from hybridnav.graphs.files.xml_reader import _HEAD, _MOST_LEVELS, MOST_BYTES, XmlReader
 from hybridnav.graphs.gather import number_of, pair_of, shown
 
 # From metres to latitude and longitude, and back.
@@ -26,6 +26,10 @@ _EQUATOR_M = 6378137.0
 _SQUARED_ECCENTRICITY = 6.69437999014e-3
 """WGS 84."""
 _MOST_LATITUDE_DEG = 85.0
+_HEAD = 4096
+"""Characters in which the first element begins."""
+_MOST_LEVELS = 100
+"""Levels that one `level` may list."""
 
 
 @dataclass(frozen=True)

@@ -5,23 +5,13 @@ from __future__ import annotations
 from typing import Any
 from xml.parsers import expat
 
+from hybridnav._base.files import printable
 from hybridnav.errors import MapError
-from hybridnav.graphs.gather import shown
 
 MOST_BYTES = 2**25
 """Most characters of a file: some 100,000 ways, which take 150 MB of memory."""
-
-
 _ENCODINGS = ("UTF-8", "UTF8", "US-ASCII", "ASCII")
 """Those that an XML declaration may state: files are read as UTF-8."""
-
-
-_HEAD = 4096
-"""Characters in which the first element begins."""
-
-
-_MOST_LEVELS = 100
-"""Levels that one `level` may list."""
 
 
 class XmlReader:
@@ -62,8 +52,8 @@ class XmlReader:
         def check(_version: str, encoding: str | None, _standalone: int) -> None:
             if encoding is not None and encoding.upper() not in _ENCODINGS:
                 raise MapError(
-                    f"{where}: declares the encoding {shown(encoding)!r:.40}, expected UTF-8: save "
-                    "the file in that encoding"
+                    f"{where}: declares the encoding {printable(encoding)!r:.40}, expected UTF-8: "
+                    "save the file in that encoding"
                 )
 
         parser.StartElementHandler, parser.EndElementHandler = begin, end
