@@ -30,6 +30,7 @@ from .maps import (
     RoomLabels as RoomLabels,
     RoomUse as RoomUse,
     drop_islands as drop_islands,
+    grids_of_shapes as grids_of_shapes,
 )
 from .maps.costs import (
     CostLayer as CostLayer,
@@ -39,6 +40,7 @@ from .maps.costs import (
 from .maps.files import (
     example_map as example_map,
     load_map as load_map,
+    load_shapes as load_shapes,
     write_movingai_map as write_movingai_map,
     write_ros_map as write_ros_map,
 )

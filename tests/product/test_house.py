@@ -43,7 +43,7 @@ BUDGETS = {
     "graphs": (6600, 8),
     "guide": (3800, 10),
     "harness": (8300, 11),
-    "maps": (4900, 7),
+    "maps": (5420, 7),
     "models": (2100, 6),
     "planning": (6850, 12),
     "pyramid": (4450, 9),

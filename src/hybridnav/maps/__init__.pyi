@@ -14,6 +14,7 @@ from .room_labels import (
     RoomLabels as RoomLabels,
     RoomUse as RoomUse,
 )
+from .shapes import ShapeGrids as ShapeGrids, grids_of_shapes as grids_of_shapes
 from .widest import Bottleneck as Bottleneck, WidestPaths as WidestPaths
 
 __all__: list[str]

@@ -10,5 +10,6 @@ from .ros import (
     load_ros_map as load_ros_map,
     write_ros_map as write_ros_map,
 )
+from .sdf import ShapeWorld as ShapeWorld, load_shapes as load_shapes
 
 __all__: list[str]
