@@ -144,7 +144,7 @@ class JudgedPath:
         stated = self.clearance
         return {
             "legal": self.legal,
-            "contacts": [vars(each) for each in self.contacts],
+            "contacts": [vars(each) | {"depth_m": _finite(each.depth_m)} for each in self.contacts],
             "length_m": self.length_m,
             "status": str(self.optimum.status),
             "optimum_low_m": low,

@@ -40,7 +40,7 @@ class Contact:
     y: float
     """y of it."""
     depth_m: float
-    """Metres from there to the nearest free cell; 0 at corners."""
+    """Metres from there to the nearest free cell, infinite without any; 0 at corners."""
     from_m: float
     """Metres along the path at which it begins."""
     to_m: float
@@ -115,6 +115,8 @@ def contacts_of(
     free = np.ascontiguousarray(free_of[grid.classes])
     near = kernels.neighbours_in_row(free)
     deepest = kernels.farthest(near, first, last, 1.0, _WITHIN_CELLS)
+    if not free.any():
+        deepest[:, 1] = math.inf
     begins = along_of(positions)[segment]
     length = hypots(step[:, 0], step[:, 1])
     ranges = begins[:, None] + spans[:, 1:] * length[:, None]
