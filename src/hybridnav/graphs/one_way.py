@@ -64,7 +64,7 @@ def one_way_rules(graph: WaypointGraph, grid: OccupancyGrid) -> tuple[OneWayRule
     >>> plain.add_edge("in", "out")
     >>> grid = hn.OccupancyGrid(np.zeros((3, 10)), robot_radius_m=0)
     >>> [str(rule) for rule in one_way_rules(WaypointGraph.from_networkx(plain), grid)]
-    ['line:5,0:5,3']
+    ['line:5,-0.5:5,3']
     """
     checked_type("graph", graph, WaypointGraph)
     checked_type("grid", grid, OccupancyGrid)
