@@ -122,13 +122,16 @@ def _faults_of(
         yield f"a path of {result.cost}, expected none"
     elif preset in {"shortest", *CELLS} and abs(result.cost - best) > 1e-9:
         yield f"costs {result.cost}, expected {best}"
-    if result.cost < best - 1e-9 or not result.lower_bound <= result.cost + 1e-9:
+    spare = 1e-7 if preset == "robot" else 1e-9  # as plain Python it adds single precision
+    if result.cost < best - spare or not result.lower_bound <= result.cost + spare:
         yield f"cost {result.cost} or bound {result.lower_bound}, best {best}"
     cells = [tuple(cell) for cell in result.path.cells.tolist()]
     if not plane.allows_moves(cells, strict=preset in CELLS):
         yield f"cells pass a side the wrong way: {cells}"
     if preset not in CELLS:
-        points = [(_exact(y), _exact(x)) for x, y in result.path.points[:, :2].tolist()]
+        # Bends of `robot` are rounded into arcs; its straight lines are those that are legal.
+        line = result.path.points if result.line is None else result.line
+        points = [(_exact(y), _exact(x)) for x, y in line[:, :2].tolist()]
         if not plane.allows((ends[0][0], ends[1][0]), points):
             yield f"line passes a side the wrong way: {points}"
 
