@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.common import NEEDED_DATA, Refused
+from hybridnav.errors import HybridNavError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,6 +39,22 @@ def main(words: Sequence[str] | None = None) -> int:
         out.write(f"{__doc__}\n\n" if is_asked else f"no subject is called {name}; there are\n")
         out.writelines(f"  {key:18}{about(file)}\n" for key, file in SUBJECTS.items())
         return 0 if is_asked else 2
+    try:
+        return run(name, rest)
+    except HybridNavError as error:  # as of a planner of others without its package
+        sys.stderr.write(f"{name}: {error}\n")
+        return 2
+    except ModuleNotFoundError as error:
+        package = str(error.name).partition(".")[0]
+        if package in {"hybridnav", "benchmarks"}:
+            raise
+        how = "python -m pip install '.[bench,dev]'"
+        sys.stderr.write(f"{name} needs {package}, which is not installed: {how}\n")
+        return 2
+
+
+def run(name: str, rest: Sequence[str]) -> int:
+    """Run a subject with its options; return its exit code."""
     home = SUBJECTS[name].relative_to(ROOT).with_suffix("")
     subject = import_module(".".join(home.parts))
     parser = argparse.ArgumentParser(

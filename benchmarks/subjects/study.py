@@ -24,6 +24,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from benchmarks.common import DATA, ROOT, Refused, option
+from benchmarks.subjects._study_beside import CHART as BESIDE_CHART
+from benchmarks.subjects._study_beside import plot_beside
 from benchmarks.subjects._study_charts import charts_of, write_charts
 from benchmarks.subjects._study_data import LEVELS_FILE, collect
 from benchmarks.subjects._study_descent import CHART, levels_of, plot_levels_of
@@ -79,6 +81,8 @@ def write_pages(docs: Path) -> None:
     """Write the page from the file of figures beside it."""
     data = json.loads((docs / FIGURES).read_text(encoding="utf-8"))
     replace_file(docs / "study.md", page(data).encode())
+    (docs / "images").mkdir(exist_ok=True)
+    save_figure(plot_beside(data), docs / "images" / BESIDE_CHART)
 
 
 OPTIONS = [

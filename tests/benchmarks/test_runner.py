@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import SUBJECTS, main
+from benchmarks.rivals import needed_package
 
 ROOT = Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("maps/*.md")]
@@ -43,6 +44,27 @@ def test_a_subject_that_needs_the_data_says_so(monkeypatch, capsys):
     monkeypatch.delenv("HYBRIDNAV_DATA", raising=False)
     assert main(["rooms"]) == 2
     assert capsys.readouterr().err.count("HYBRIDNAV_DATA") == 1
+
+
+@pytest.mark.parametrize("lost", ["rosbags", "evo"])
+def test_a_subject_without_its_packages_ends_in_one_line(lost, monkeypatch, capsys):
+    def fail(_name):
+        raise ModuleNotFoundError(name=lost)
+
+    monkeypatch.setattr("benchmarks.__main__.import_module", fail)
+    assert main(["peers", "--pairs", "1"]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"peers needs {lost}, which is not installed: python -m pip install '.[bench,dev]'"
+    ]
+
+
+def test_a_planner_of_others_without_its_package_ends_in_one_line(monkeypatch, capsys, tmp_path):
+    def fail(_given):
+        needed_package("no-such-package")
+
+    monkeypatch.setattr("benchmarks.subjects.peers.main", fail)
+    assert main(["peers", "--data", str(tmp_path)]) == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
 
 
 @pytest.mark.full
