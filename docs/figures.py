@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import hybridnav as hn
-from hybridnav import check_proof
 from hybridnav.ext.fleet import plot_building
 from hybridnav.graphs import build_lane_graph, plot_route_graph
 from hybridnav.search.descent import Descent, DescentSettings
@@ -24,6 +23,7 @@ from hybridnav.viz import (
     plot_levels,
     plot_map,
     plot_mesh,
+    plot_proof,
     plot_rooms,
     save_descent,
     save_figure,
@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
-LEVELS = (6, 8, 10, -1)
+LEVELS = (9, -1)
 REGION_CELLS = 26_420
 """A tenth of the free cells."""
 STEPS = DescentSettings(field_cells=32, step=2.0)
@@ -74,14 +74,13 @@ def draw_descent(file: Path) -> None:
 
 
 def draw_levels(file: Path) -> None:
-    """Draw four levels of the office's pyramid, fine to coarse."""
+    """Draw two levels of the office's pyramid, fine to coarse."""
     pyramid = hn.DualGraphPyramid.build(hn.load_map(OFFICE, robot_radius_m=0.25))
-    figure = Figure(figsize=(10, 7.2), layout="constrained")
-    for ax, level in zip(figure.subplots(2, 2).flat, LEVELS, strict=True):
+    figure = Figure(figsize=(8, 10.4), layout="constrained")
+    for ax, level in zip(figure.subplots(2, 1), LEVELS, strict=True):
         plot_level(pyramid[level], ax=ax)
         ax.set(xlabel="", ylabel="")
-    for ax in figure.axes[:2]:  # one legend under each column is enough
-        ax.get_legend().remove()
+    figure.axes[0].get_legend().remove()  # one is enough
     save_figure(figure, file, dpi=110)
 
 
@@ -174,26 +173,7 @@ def draw_potential(file: Path) -> None:
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
     proof = hn.prove(hn.HybridPlanner(topology, preset="octile").plan(START, GOAL))
-    walls = np.pad(~grid.enterable(), 1, constant_values=True)
-    factors = np.full(walls.shape, check_proof.ONE)
-    path = check_proof.walk(*proof["path"])
-    bound = proof["bound"] / grid.resolution_m * (1 - 1e-9)
-    bars = check_proof.bars_of(walls.shape, proof)
-    p, tree = check_proof.check_cells(walls, factors, proof, path[[0, -1]], bound, bars)
-    top, left = proof["box"][:2]
-    outside = tree == 9  # noqa: PLR2004 - the mark of cells that the tree leaves out
-    metres = np.where(outside, np.nan, p / check_proof.UNIT * grid.resolution_m)
-    rows, cols = metres.shape
-    (x, y), (x_end, y_end) = grid.frame.points_of_grid(
-        [(top - 1, left - 1), (top - 1 + rows, left - 1 + cols)]
-    )
-    ax = plot_map(grid, title="p from 0 (dark) to 43.9 m (yellow), a line every two metres")
-    ax.imshow(metres, origin="lower", extent=(x, x_end, y, y_end), cmap="viridis", zorder=2)
-    at = np.linspace(x, x_end, cols), np.linspace(y, y_end, rows)
-    levels = np.arange(0, proof["bound"], 2)
-    ax.contour(*at, metres, levels=levels, colors="white", linewidths=0.5, zorder=3)
-    ax.plot(*grid.frame.points_of(path - 1).T, color="crimson", linewidth=1.5, zorder=4)
-    save_figure(ax, file, dpi=130)
+    save_figure(plot_proof(grid, proof), file, dpi=130)
 
 
 def draw_cut(file: Path) -> None:

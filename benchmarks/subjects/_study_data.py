@@ -16,7 +16,7 @@ from hybridnav.harness.columns import (
     loss_columns,
 )
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.tables import rows_of_methods
+from hybridnav.harness.output import rows_of_methods
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW, YARDSTICKS
 from hybridnav.planning import load_preset
 

@@ -154,8 +154,8 @@ _ANSWERS = "by scipy or by another method, "
 _SOBERING = "{paper_octile} % longer than the octile optimum in the mean "
 
 QUOTES = (
-    Quote("README.md", _ANSWERS + "{maps} public maps | {contradictions} of {checks} |"),
-    Quote("README.md", "any-angle optimum, {maps} public maps | {paper_any} % in the mean |"),
+    Quote("README.md", "[{maps} public maps](docs/study.md) {contradictions} of {checks} answers"),
+    Quote("README.md", "(`paper`, one step) is {paper_any} % above the any-angle optimum"),
     Quote("docs/peers.md", "implementation loses {hpa_octile} % in the mean"),
     Quote(
         "docs/peers.md",

@@ -17,7 +17,7 @@ from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
 from hybridnav.harness.names import NamedMethod, class_of
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.planning import load_preset
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ def run(  # noqa: PLR0913 - two have defaults
             limit_s=plan.limit_s,
         )
         clock = _Clock(folder, plan, part.name)
-        made = evaluate(settings, folder / part.name, progress=clock.tell)
+        made = write_records(settings, folder / part.name, progress=clock.tell)
         clock.note()
         sys.stderr.write(f"{part.name}: {made:,} new records in {clock.seconds:.0f} s\n")
 

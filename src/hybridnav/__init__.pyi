@@ -50,6 +50,7 @@ from .models import (
     export_places as export_places,
     export_rooms as export_rooms,
     load as load,
+    plan as plan,
     save as save,
 )
 from .planning import (
@@ -69,6 +70,8 @@ from .topology import TopologicalMap as TopologicalMap
 from .rooms import Door as Door, Rooms as Rooms, find_rooms as find_rooms
 from .rooms.files import load_rooms as load_rooms, save_rooms as save_rooms
 
+from .viz import plot as plot
+from .harness import evaluate as evaluate
 from .reasons import explain as explain, prove as prove
 from .route import Route as Route
 

@@ -27,9 +27,9 @@ from hybridnav.graphs.method import GraphMethod
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.judges import segment_faults
+from hybridnav.harness.output import rows_of_methods
 from hybridnav.harness.records import read_records
-from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import rows_of_methods
+from hybridnav.harness.run import RunSettings, write_records
 from tests.benchmarks.test_rival_faults import LIES, nothing, short
 from tests.harness.small_runs import ROOMS, ROOT, run_here, write_map
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -50,7 +50,7 @@ def run(folder, lines=ROOMS, **options):
     settings_ = RunSettings(
         maps=(str(write_map(folder, grown)),), presets=(), methods=GRAPHS, pairs=N_PAIRS, **options
     )
-    evaluate(settings_, folder / "run")
+    write_records(settings_, folder / "run")
     return load_study(folder / "run")
 
 

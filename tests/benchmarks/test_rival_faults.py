@@ -13,9 +13,8 @@ from hybridnav.harness.analysis import load_study
 from hybridnav.harness.baselines.regions import MethodResult
 from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.names import NamedMethod
-from hybridnav.harness.output import write_outputs
-from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import rows_of_methods
+from hybridnav.harness.output import rows_of_methods, write_outputs
+from hybridnav.harness.run import RunSettings, write_records
 from tests.benchmarks.test_rivals import CASES
 from tests.harness.small_runs import ROOMS, run_here, write_map
 
@@ -70,7 +69,7 @@ def run(folder, names):
     settings = RunSettings(
         maps=(str(write_map(folder, ROOMS)),), presets=(), baselines=names, pairs=N_PAIRS
     )
-    evaluate(settings, folder / "run")
+    write_records(settings, folder / "run")
     return load_study(folder / "run")
 
 
@@ -123,7 +122,7 @@ def test_a_rival_that_refuses_the_map_is_in_the_table_with_its_file(tmp_path):
     settings = RunSettings(
         maps=(str(write_map(tmp_path, ROOMS)),), presets=("octile",), methods=(few,), pairs=3
     )
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     study = load_study(tmp_path / "run")
     assert (study.faults, study.failures) == ([], 0)
     row = next(row for row in rows_of_methods(study) if row["method"] == "few")
@@ -146,7 +145,7 @@ def test_contraction_hierarchies_plan_by_the_costs_of_a_run(tmp_path):
         pairs=N_PAIRS,
         costs=("clearance",),
     )
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     study = load_study(tmp_path / "run")
     assert study.faults == []
     kit, other = (study.of_method(name)[0] for name in ("pyroutingkit", "hpa-star"))

@@ -15,7 +15,8 @@ from PIL import Image, ImageSequence
 
 import hybridnav as hn
 from hybridnav.cli import common
-from hybridnav.cli.rendering import rounded_bound, summary
+from hybridnav.cli.rendering import summary
+from hybridnav.planning.text import rounded_bound
 
 MAPS = Path(__file__).parents[2] / "maps"
 FIGURE = MAPS / "figure1" / "figure1.yaml"
@@ -499,7 +500,7 @@ def test_show_watches_a_descent(cli, tmp_path):
 
     assert n_frames(moving) >= 3
     assert strip.stat().st_size > 10_000
-    assert cli("show", OFFICE, "--watch", "growth", moving).refuses(2, "'descent FILE'")
+    assert cli("show", OFFICE, "--watch", "fall", moving).refuses(2, "one of growth, descent")
     refused = cli("show", OFFICE, "--watch", "descent", tmp_path / "descent.mp4")
     assert refused.refuses(2, "--watch must end in .gif, .png")
     paper = ("show", OFFICE, "--preset", "paper", "--watch", "descent")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridnav.harness import RunSettings, evaluate
+from hybridnav.harness import RunSettings, write_records
 from hybridnav.maps import CellClass
 
 ROOT = Path(__file__).parents[2]
@@ -67,7 +67,7 @@ def run_in(folder, **settings):
     maps = (str(write_map(folder, ROOMS)),)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hybridnav.harness.run.run_local", run_here)
-        evaluate(RunSettings(**{"maps": maps} | settings), folder / "run")
+        write_records(RunSettings(**{"maps": maps} | settings), folder / "run")
     return folder / "run"
 
 

@@ -16,7 +16,7 @@ from hybridnav.ext.fleet.search import LinkSearch
 from hybridnav.ext.live import OnlinePyramid, OnlineRooms, replay
 from hybridnav.ext.live.explore import explore
 from hybridnav.ext.live.mapping import Mapper
-from hybridnav.harness import RunSettings, evaluate
+from hybridnav.harness import RunSettings, write_records
 from hybridnav.harness.records import read_records
 from hybridnav.search.grid_search import GridSearch
 from tests.harness import faulty_methods as faulty
@@ -82,7 +82,7 @@ def test_no_time_of_a_record_contains_a_compilation(tmp_path):
         pairs=2,
         repeat=1,
     )
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     records = read_records(tmp_path / "run")
     own = [one for one in records if one["method"] == label_of(Compiles)]
     seconds = [one["method_seconds" if "method_seconds" in one else "seconds"] for one in own]

@@ -16,7 +16,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import distances_on_cluster, workers
 from hybridnav.harness.records import read_records
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, ROOT, name_of, write_map
 from tests.harness.test_run import timeless
@@ -64,11 +64,11 @@ def settings(tmp_path_factory):
 
 def test_a_cluster_makes_the_records_of_local_workers(cluster, settings, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    made = evaluate(settings, tmp_path / "local")
+    made = write_records(settings, tmp_path / "local")
     there = replace(settings, scheduler=cluster.scheduler_address)
-    assert evaluate(there, tmp_path / "cluster") == made
+    assert write_records(there, tmp_path / "cluster") == made
     assert timeless(tmp_path / "cluster") == timeless(tmp_path / "local")
-    assert evaluate(there, tmp_path / "local") == 0
+    assert write_records(there, tmp_path / "local") == 0
 
 
 @pytest.mark.full  # starts workers until one is lost
@@ -96,7 +96,7 @@ def test_the_tasks_of_a_worker_that_is_lost_run_again(cluster, settings, tmp_pat
 
     thread = threading.Thread(target=kill_the_worker_at_work)
     thread.start()
-    made = evaluate(only, tmp_path)
+    made = write_records(only, tmp_path)
     thread.join()
     assert killed
     records = read_records(tmp_path)
@@ -111,7 +111,7 @@ def test_a_task_that_kills_every_worker_is_recorded_as_lost(
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
     baselines = (name_of(faulty.Dies), "grid-dijkstra")
     only = replace(settings, presets=(), baselines=baselines, scheduler=cluster.scheduler_address)
-    evaluate(only, tmp_path)
+    write_records(only, tmp_path)
     status: dict[str, set[str]] = {}
     for record in read_records(tmp_path):
         status.setdefault(record["method"], set()).add(record["status"])
@@ -150,7 +150,7 @@ def test_a_cluster_finds_the_tables_of_one_process(cluster, monkeypatch):
 @pytest.mark.parametrize("address", ["nonsense", "bogus://x:1", "tcp://127.0.0.1", ""])
 def test_an_address_that_is_none_is_refused_in_a_line(settings, tmp_path, address):
     with pytest.raises(InvalidValueError, match="scheduler") as caught:
-        evaluate(replace(settings, scheduler=address), tmp_path)
+        write_records(replace(settings, scheduler=address), tmp_path)
     assert "\n" not in str(caught.value)
 
 
@@ -158,7 +158,7 @@ def test_a_scheduler_that_is_not_there_is_missed_in_a_line(settings, tmp_path, m
     monkeypatch.setattr(workers, "CONNECT_S", 1.0)
     began = time.monotonic()
     with pytest.raises(InvalidValueError, match=r"scheduler tcp://127\.0\.0\.1:9: ") as caught:
-        evaluate(replace(settings, scheduler="tcp://127.0.0.1:9"), tmp_path)
+        write_records(replace(settings, scheduler="tcp://127.0.0.1:9"), tmp_path)
     assert "\n" not in str(caught.value)
     assert time.monotonic() - began < 8
 
@@ -169,4 +169,4 @@ def test_a_scheduler_without_workers_is_not_waited_for(settings, tmp_path, monke
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0", silence_logs=50) as empty:
         only = replace(settings, scheduler=empty.scheduler_address)
         with pytest.raises(InvalidValueError, match=r"has had no worker for 0\.5 s: start workers"):
-            evaluate(only, tmp_path)
+            write_records(only, tmp_path)

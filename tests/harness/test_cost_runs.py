@@ -12,12 +12,12 @@ from hybridnav._base.poses import Motion
 from hybridnav.harness import (
     RunSettings,
     compare_runs,
-    evaluate,
     load_study,
     to_frame,
     write_outputs,
+    write_records,
 )
-from hybridnav.harness.columns import rows_of_study
+from hybridnav.harness.analysis import rows_of_study
 from hybridnav.harness.records import RECORDS_FILE, decode_path, read_records
 from hybridnav.maps.costs import cost_along
 from tests.harness import faulty_costs as faulty
@@ -65,7 +65,7 @@ def settings(tmp_path_factory: Any) -> RunSettings:
 @pytest.fixture(scope="module")
 def folder(settings: RunSettings, tmp_path_factory: Any) -> Any:
     folder = tmp_path_factory.mktemp("costs") / "run"
-    evaluate(settings, folder)
+    write_records(settings, folder)
     return folder
 
 
@@ -215,17 +215,17 @@ def test_a_run_resumes_and_refuses_other_costs(
 ) -> None:
     lines = (folder / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     (tmp_path / RECORDS_FILE).write_bytes(b"".join(lines[: len(lines) // 2]))
-    assert evaluate(settings, tmp_path) == len(lines) - len(lines) // 2
-    assert evaluate(settings, tmp_path) == 0
+    assert write_records(settings, tmp_path) == len(lines) - len(lines) // 2
+    assert write_records(settings, tmp_path) == 0
     runs = (tmp_path / "runs.jsonl").read_text()
     for other, words in (((), "without costs"), (("clearance",), "with costs clearance")):
         with pytest.raises(hn.errors.InvalidValueError, match=words) as refused:
-            evaluate(replace(settings, presets=PRESETS, costs=other), tmp_path)
+            write_records(replace(settings, presets=PRESETS, costs=other), tmp_path)
         assert "\n" not in str(refused.value)
     assert (tmp_path / "runs.jsonl").read_text() == runs
     both = (folder / RECORDS_FILE).read_text()
     plain = replace(settings, presets=(), baselines=(), costs=(), pairs=2)
-    evaluate(plain, tmp_path / "plain")
+    write_records(plain, tmp_path / "plain")
     path = tmp_path / "plain" / RECORDS_FILE
     path.write_text(path.read_text() + both)
     with pytest.raises(hn.errors.InvalidValueError, match="records with different costs"):
@@ -238,7 +238,7 @@ def test_runs_with_costs_are_compared_by_costs(folder: Any) -> None:
     octile = outcome_of(study, "octile")
     assert rows["octile"]["loss of the first %"] == pytest.approx(100 * octile.losses.mean())
     other = folder.parent / "lengths"
-    evaluate(RunSettings(maps=(octile.preparation["file"],), pairs=2), other)
+    write_records(RunSettings(maps=(octile.preparation["file"],), pairs=2), other)
     with pytest.raises(hn.errors.InvalidValueError, match="share no method, map and pair"):
         compare_runs(folder, other)
     with pytest.raises(hn.errors.InvalidValueError, match="has no costs to refer to"):
@@ -251,14 +251,14 @@ def test_cells_that_costs_close_are_occupied_for_all(settings: RunSettings, tmp_
     closed[:, 9] = True  # the doors between west and east
     layer = layer_of(np.full(grid.shape, 2.0), closed)
     only = replace(settings, baselines=(name_of(faulty.ByLength),), presets=("shortest",))
-    evaluate(replace(only, costs=layer), tmp_path)
+    write_records(replace(only, costs=layer), tmp_path)
     study = write_outputs(tmp_path)
     assert study.faults == []
     assert study.costs == f"array {layer.digest[:12]}"
     other = layer_of(np.full(grid.shape, 3.0), closed)
     with pytest.raises(hn.errors.InvalidValueError, match=r"with costs array [0-9a-f]{12}"):
-        evaluate(replace(only, costs=other), tmp_path)
-    evaluate(replace(only, costs=layer_of(np.full(grid.shape, 2.0), closed)), tmp_path)
+        write_records(replace(only, costs=other), tmp_path)
+    write_records(replace(only, costs=layer_of(np.full(grid.shape, 2.0), closed)), tmp_path)
     for outcome in study.outcomes:
         for record in outcome.records:
             west = record["start"][1] < 9, record["goal"][1] < 9
@@ -280,7 +280,7 @@ def test_wrong_costs_are_refused_in_one_line(
     settings: RunSettings, tmp_path: Any, costs: Any, message: str
 ) -> None:
     with pytest.raises(hn.errors.InvalidValueError, match=message) as refused:
-        evaluate(replace(settings, costs=costs), tmp_path / "run")
+        write_records(replace(settings, costs=costs), tmp_path / "run")
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "run").exists()
 
@@ -293,8 +293,8 @@ def test_a_preset_with_costs_of_its_own_takes_those_of_the_run(
     with pytest.raises(
         hn.errors.InvalidValueError, match=r"preset paper plans by costs, and this run"
     ):
-        evaluate(replace(only, costs=()), tmp_path)
-    evaluate(only, tmp_path)
+        write_records(replace(only, costs=()), tmp_path)
+    write_records(only, tmp_path)
     paper = outcome_of(load_study(tmp_path), "paper")
     assert paper.faults == []
     assert paper.metric == "weighted"

@@ -14,15 +14,15 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.harness.analysis import load_study, to_frame
+from hybridnav.harness.analysis import load_study, rows_of_study, to_frame
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
-from hybridnav.harness.columns import MEANINGS, consistency_row, figures, rows_of_study
+from hybridnav.harness.columns import MEANINGS, consistency_row, figures
 from hybridnav.harness.judging import Judge
 from hybridnav.harness.methods import Prepared
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
 from hybridnav.harness.report import command_of
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.harness.scenes import Pair
 from hybridnav.harness.yardstick import KINDS, contradiction
 from tests.harness import faulty_methods as faulty
@@ -89,7 +89,7 @@ def folder(tmp_path_factory):
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", importable())
-        evaluate(settings, folder / "run")
+        write_records(settings, folder / "run")
     return folder / "run"
 
 

@@ -12,7 +12,7 @@ import hybridnav as hn
 from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.methods import baseline_spec, prepare
 from hybridnav.harness.output import write_outputs
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.search.found import Found
 from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
 from tests.planning.test_own_method import ByCells
@@ -70,7 +70,7 @@ def outcome_of(method: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         pairs=6,
         robot_radius_m=0.0,
     )
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     (outcome,) = study.of_method(method.__name__)
     return outcome

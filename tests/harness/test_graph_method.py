@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.graphs.method import GraphMethod
-from hybridnav.harness import RunSettings, evaluate, load_study
+from hybridnav.harness import RunSettings, load_study, write_records
 from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import read_records
 from tests.drawn_rooms import HOUSE, topology_of
@@ -113,7 +113,7 @@ def test_a_sound_graph_has_no_counter_examples(tmp_path):
     built = hn.graphs.build_lane_graph(topology)
     graph = hn.graphs.WaypointGraph.from_networkx(_points(built), name="house")
     settings_ = RunSettings(maps=(str(path),), presets=(), graphs=(graph,), pairs=60)
-    evaluate(settings_, tmp_path / "run")
+    write_records(settings_, tmp_path / "run")
     records = [one for one in read_records(tmp_path / "run") if one["method"] == "graph house"]
     assert records[0]["graph"]["sha256"] == graph.digest
     pairs = [one for one in records if one["type"] == "pair"]
@@ -141,7 +141,7 @@ def test_edges_through_walls_are_counter_examples_unless_they_are_left_out(tmp_p
         settings_ = RunSettings(
             maps=(str(path),), presets=(), graphs=(mine,), clear_edges_only=only, pairs=80
         )
-        evaluate(settings_, run)
+        write_records(settings_, run)
         pairs = [one for one in read_records(run) if (one["type"], one["method"]) == ("pair", name)]
         assert len(pairs) >= 80
         walls = [
@@ -162,18 +162,18 @@ def test_settings_that_do_not_go_together(tmp_path):
     path = str(write_map(tmp_path, ROOMS))
     mine = house_graph()
     with pytest.raises(hn.errors.InvalidValueError, match="one map"):
-        evaluate(RunSettings(maps=(path, path), graphs=(mine,)), tmp_path / "run")
+        write_records(RunSettings(maps=(path, path), graphs=(mine,)), tmp_path / "run")
     with pytest.raises(hn.errors.InvalidValueError, match="graph house: an any-angle path never"):
-        evaluate(
+        write_records(
             RunSettings(maps=(path,), presets=(), graphs=(mine,), corner_cutting=True),
             tmp_path / "run",
         )
     route_graph = hn.graphs.build_lane_graph(topology_of(HOUSE))
     wrong: Any = (route_graph,)
     with pytest.raises(hn.errors.InvalidValueError, match="expected a WaypointGraph"):
-        evaluate(RunSettings(maps=(path,), presets=(), graphs=wrong), tmp_path / "run")
+        write_records(RunSettings(maps=(path,), presets=(), graphs=wrong), tmp_path / "run")
     with pytest.raises(hn.errors.MapNotFoundError, match=r"none\.geojson: no such file"):
-        evaluate(RunSettings(maps=(path,), graphs=("none.geojson",)), tmp_path / "run")
+        write_records(RunSettings(maps=(path,), graphs=("none.geojson",)), tmp_path / "run")
     grid = hn.OccupancyGrid(np.zeros((4, 4), np.float32), robot_radius_m=0, corner_cutting=True)
     with pytest.raises(hn.errors.InvalidValueError, match="corner cutting"):
         GraphMethod(grid, mine)
@@ -188,10 +188,10 @@ def test_a_graph_goes_to_a_process_of_its_own_and_its_records_are_kept(tmp_path)
     nx.add_path(plain, [0, 1, 2])
     mine = hn.graphs.WaypointGraph.from_networkx(plain, name="mine")
     settings_ = RunSettings(maps=(path,), presets=(), graphs=(mine,), pairs=5)
-    records = evaluate(settings_, tmp_path / "run")
+    records = write_records(settings_, tmp_path / "run")
     assert records >= 12
-    assert evaluate(settings_, tmp_path / "run") == 0
+    assert write_records(settings_, tmp_path / "run") == 0
     plain.add_edge(0, 2)
     more = hn.graphs.WaypointGraph.from_networkx(plain, name="mine")
     again = RunSettings(maps=(path,), presets=(), graphs=(more,), pairs=5)
-    assert evaluate(again, tmp_path / "run") == records // 2
+    assert write_records(again, tmp_path / "run") == records // 2

@@ -17,13 +17,13 @@ import hybridnav as hn
 from benchmarks.subjects._study_data import part_figures
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness import AnyAngleOptimum, load_study
-from hybridnav.harness.analysis import pairs_in_common
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.judges import VisibilityGraph
 from hybridnav.harness.methods import preset_spec
+from hybridnav.harness.outcome import pairs_in_common
 from hybridnav.harness.output import report_of, write_outputs
 from hybridnav.harness.records import query_key, read_records
-from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.harness.run import RunSettings, methods_of, write_records
 from hybridnav.harness.yardstick import OPTIMA, Yardstick, contradiction
 from hybridnav.maps.files import load_map
 from hybridnav.planning import load_preset
@@ -201,7 +201,7 @@ def test_a_yardstick_that_is_wrong_is_found_out(folder, tmp_path, monkeypatch, f
     right = AnyAngleOptimum.length_m
     monkeypatch.setattr(AnyAngleOptimum, "length_m", lambda *endpoints: factor * right(*endpoints))
     only = RunSettings(maps=(str(folder.parent / "rooms.map"),), presets=(), pairs=5)
-    evaluate(only, tmp_path)
+    write_records(only, tmp_path)
     faults = [fault for _, _, fault in write_outputs(tmp_path).faults]
     assert len(faults) >= 3
     assert all("the any-angle optimum by the mesh is" in fault for fault in faults)
@@ -216,7 +216,7 @@ def test_a_map_of_many_corners_is_checked_like_any_other(tmp_path, monkeypatch, 
     right = AnyAngleOptimum.length_m
     monkeypatch.setattr(AnyAngleOptimum, "length_m", lambda *endpoints: factor * right(*endpoints))
     run = tmp_path / "run"
-    evaluate(RunSettings(maps=(str(write_map(tmp_path, lines)),), presets=(), pairs=5), run)
+    write_records(RunSettings(maps=(str(write_map(tmp_path, lines)),), presets=(), pairs=5), run)
     faults = [fault for _, _, fault in write_outputs(run).faults]
     checked = 3 if factor == 1 else 0
     assert len(faults) == 3 - checked
@@ -313,8 +313,8 @@ def test_a_run_of_lines_equals_itself_and_differs_from_one_of_cells(folder, tmp_
         maps=(str(folder.parent / "rooms.map"),), pairs=N_PAIRS, merge_distance_m=4.0
     )
     smooth = load_preset("octile", overrides=["planner.smooth=line-of-sight"])
-    evaluate(replace(settings, presets=("octile",)), tmp_path / "cells")
-    evaluate(replace(settings, presets=(smooth,)), tmp_path / "lines")
+    write_records(replace(settings, presets=("octile",)), tmp_path / "cells")
+    write_records(replace(settings, presets=(smooth,)), tmp_path / "lines")
     # What is no loss by definition is no chart of its own.
     write_outputs(tmp_path / "lines")
     report = (tmp_path / "lines" / "report.html").read_text()
@@ -382,7 +382,7 @@ def test_the_preset_of_shortest_paths_loses_nothing(tmp_path):
         pairs=N_PAIRS,
         merge_distance_m=4.0,
     )
-    evaluate(only, tmp_path / "run")
+    write_records(only, tmp_path / "run")
     study = write_outputs(tmp_path / "run", metric="any-angle")
     assert study.faults == []
     losses = outcome_of(study, "shortest").losses
@@ -444,7 +444,7 @@ def test_what_ompl_does_not_find_is_not_its_own(tmp_path):
     hopeless = "{confine: mask, iterations: 1, budget_s: 10, simplify: false}"
     preset = load_preset("ompl", overrides=[f"planner.ompl={hopeless}"])
     map_file = ROOT / "maps" / "office" / "office.yaml"
-    evaluate(RunSettings(maps=(str(map_file),), presets=(preset,), pairs=8), tmp_path)
+    write_records(RunSettings(maps=(str(map_file),), presets=(preset,), pairs=8), tmp_path)
     outcome = outcome_of(write_outputs(tmp_path), "ompl")
     by_grid = [r for r in outcome.records if r.get("by_grid")]
     assert outcome.by_grid == len(by_grid) > 0

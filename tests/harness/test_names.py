@@ -11,14 +11,13 @@ from html import unescape
 import pytest
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.analysis import load_study, to_frame
-from hybridnav.harness.columns import rows_of_study
+from hybridnav.harness.analysis import load_study, rows_of_study, to_frame
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.methods import BASELINES, baseline_spec
 from hybridnav.harness.names import NamedMethod, class_of, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
-from hybridnav.harness.run import RunSettings, evaluate, methods_of
+from hybridnav.harness.run import RunSettings, methods_of, write_records
 from hybridnav.harness.workers import run_local
 from tests.harness.small_runs import ROOMS, write_map
 
@@ -77,14 +76,14 @@ def test_a_name_that_is_not_there_has_a_hint():
 
 
 def test_a_class_is_called_what_it_calls_itself(settings, tmp_path):
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     assert write_outputs(tmp_path / "run").labels == ["grid-astar", "HPA* of mine"]
     assert "HPA* of mine" in (tmp_path / "run" / "report.html").read_text()
 
 
 def test_a_class_that_takes_the_name_of_another_method_has_its_path(settings, tmp_path):
     (tmp_path / "mine.py").write_text(CLASS.replace("HPA* of mine", "grid-astar"))
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     assert study.labels == ["grid-astar", "mine:Mine"]
     assert study.checks > 0
@@ -193,7 +192,7 @@ def test_a_method_has_one_name_in_records_and_tables(tmp_path, monkeypatch):
         methods=(NamedMethod("class", "others:Said", "named by a user"),),
         pairs=1,
     )
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     expected = {"grid-astar", "octile", "named by a user", *NAMES.values()}
     file = tmp_path / "run" / RECORDS_FILE
     lines = [json.loads(line) for line in file.read_text().splitlines()]
@@ -207,7 +206,7 @@ def test_a_method_has_one_name_in_records_and_tables(tmp_path, monkeypatch):
     assert load_study(tmp_path / "run").faults == []
     compared = compare_runs(tmp_path / "run", tmp_path / "run")
     assert {row["method"] for row in compared} == expected - {"grid-astar"}
-    assert evaluate(settings, tmp_path / "run") == 0
+    assert write_records(settings, tmp_path / "run") == 0
     # Version 0.1 wrote `module:class`, and what a class calls itself into its preparation alone.
     older = []
     for line in lines:
@@ -218,14 +217,14 @@ def test_a_method_has_one_name_in_records_and_tables(tmp_path, monkeypatch):
     file.write_text("".join(f"{json.dumps(line)}\n" for line in older))
     assert names_in_tables(tmp_path / "run") == names
     assert {one["method"] for one in read_records(tmp_path / "run")} == expected
-    assert evaluate(settings, tmp_path / "run") == 0
+    assert write_records(settings, tmp_path / "run") == 0
 
 
 def test_a_class_has_its_name_on_maps_too_on_which_it_is_not_asked(settings, tmp_path):
     (tmp_path / "others.py").write_text(OTHERS)
     tall = str(write_map(tmp_path, [*ROOMS, *ROOMS], "tall"))
     run = replace(settings, maps=(tall, *settings.maps), baselines=("others:Narrow",))
-    evaluate(run, tmp_path / "run")
+    write_records(run, tmp_path / "run")
     names = names_in_tables(tmp_path / "run")
     assert names == {where: {"grid-astar", "said when made"} for where in names}
     records = read_records(tmp_path / "run")
@@ -233,10 +232,10 @@ def test_a_class_has_its_name_on_maps_too_on_which_it_is_not_asked(settings, tmp
 
 
 def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
-    made = evaluate(settings, tmp_path / "run")
-    assert evaluate(settings, tmp_path / "run") == 0
+    made = write_records(settings, tmp_path / "run")
+    assert write_records(settings, tmp_path / "run") == 0
     (tmp_path / "mine.py").write_text(CLASS.replace("{}", "twice"))
-    assert evaluate(settings, tmp_path / "run") == made // 2
+    assert write_records(settings, tmp_path / "run") == made // 2
     study = write_outputs(tmp_path / "run")
     assert study.labels == ["grid-astar", "HPA* of mine"]
     sources = [r["source"] for r in read_records(tmp_path / "run") if "source" in r]
@@ -245,16 +244,16 @@ def test_a_class_that_was_mended_is_run_again(settings, tmp_path):
     assert words in (tmp_path / "run" / "summary.md").read_text()
     # Back again: the records are there, and the tables show them.
     (tmp_path / "mine.py").write_text(CLASS)
-    assert evaluate(settings, tmp_path / "run") == 0
+    assert write_records(settings, tmp_path / "run") == 0
     study = write_outputs(tmp_path / "run")
     assert study.of_method("HPA* of mine")[0].preparation["source"] == sources[0]
 
 
 def test_answers_before_a_class_was_mended_enter_no_table_with_new_ones(settings, tmp_path):
     halls = str(write_map(tmp_path, ROOMS[::-1], "halls"))
-    evaluate(replace(settings, maps=(*settings.maps, halls)), tmp_path / "run")
+    write_records(replace(settings, maps=(*settings.maps, halls)), tmp_path / "run")
     (tmp_path / "mine.py").write_text(CLASS.replace("{}", "twice"))
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     assert [o.map_name for o in study.of_method("HPA* of mine")] == ["rooms"]
     (row,) = [row for row in rows_of_study(study) if row["method"] == "HPA* of mine"]
@@ -267,7 +266,7 @@ def test_answers_before_a_class_was_mended_enter_no_table_with_new_ones(settings
     for name in ("summary.md", "report.html"):
         assert words in (tmp_path / "run" / name).read_text()
     # A run that adds a method does not bring the old answers back.
-    evaluate(replace(settings, maps=(halls,), baselines=("weighted-astar",)), tmp_path / "run")
+    write_records(replace(settings, maps=(halls,), baselines=("weighted-astar",)), tmp_path / "run")
     assert write_outputs(tmp_path / "run").warnings == [words]
 
 
@@ -309,7 +308,7 @@ def test_methods_have_names_and_settings_of_their_own(settings, tmp_path):
         NamedMethod("preset", "shortest", "near", {"planner.epsilon": 0.1}),
     )
     run = replace(settings, baselines=(), methods=named)
-    evaluate(run, tmp_path / "run")
+    write_records(run, tmp_path / "run")
     study = write_outputs(tmp_path / "run")
     assert study.faults == []
     assert set(study.labels) == {"grid-astar", "HPA* (20)", "heavy", "mine:Mine", "near"}
@@ -322,7 +321,7 @@ def test_methods_have_names_and_settings_of_their_own(settings, tmp_path):
 
 def test_a_class_that_fails_shows_its_traceback(settings, tmp_path):
     bad = NamedMethod("class", "mine:Mine", "bad", {"weight": 3})
-    evaluate(replace(settings, baselines=(), methods=(bad,)), tmp_path / "run")
+    write_records(replace(settings, baselines=(), methods=(bad,)), tmp_path / "run")
     write_outputs(tmp_path / "run")
     for file in ("summary.md", "report.html"):
         text = (tmp_path / "run" / file).read_text()
@@ -335,13 +334,13 @@ def test_a_class_that_fails_costs_no_reference(settings, tmp_path):
     bad = NamedMethod("class", "mine:Mine", "bad", {"weight": 3})
     only = replace(settings, baselines=(), methods=(bad,))
     seen = []
-    made = evaluate(only, tmp_path / "run", progress=lambda *counts: seen.append(counts))
+    made = write_records(only, tmp_path / "run", progress=lambda *counts: seen.append(counts))
     assert seen[-1][0] <= seen[-1][1] == 2 * made
     study = write_outputs(tmp_path / "run")
     assert (study.labels, study.checks, study.failures) == (["bad"], 0, made - 1)
-    assert evaluate(only, tmp_path / "run") == 0
+    assert write_records(only, tmp_path / "run") == 0
     # Beside a method that works the reference is asked.
-    assert evaluate(replace(only, baselines=("thrun",)), tmp_path / "run") == 2 * made
+    assert write_records(replace(only, baselines=("thrun",)), tmp_path / "run") == 2 * made
     assert write_outputs(tmp_path / "run").labels == ["grid-astar", "thrun", "bad"]
 
 
@@ -349,5 +348,5 @@ def test_a_module_that_cannot_be_imported_is_told_at_once(settings, tmp_path):
     (tmp_path / "broken.py").write_text("import nothing_of_that_name\n")
     began = time.monotonic()
     with pytest.raises(InvalidValueError, match=r"ModuleNotFoundError: .*nothing_of_that_name"):
-        evaluate(replace(settings, baselines=("broken:Class",)), tmp_path / "run")
+        write_records(replace(settings, baselines=("broken:Class",)), tmp_path / "run")
     assert time.monotonic() - began < 5

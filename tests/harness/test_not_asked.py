@@ -12,21 +12,19 @@ from html import unescape
 import pytest
 
 from hybridnav.errors import InvalidValueError, UnsuitableMapError
-from hybridnav.harness.analysis import load_study
+from hybridnav.harness.analysis import load_study, rows_of_map, rows_of_study
 from hybridnav.harness.baselines import MethodResult
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.columns import (
     EFFICIENCY_COLUMNS,
     figures,
     loss_columns,
-    rows_of_map,
-    rows_of_study,
 )
 from hybridnav.harness.names import NamedMethod
-from hybridnav.harness.output import write_outputs
+from hybridnav.harness.output import rows_of_methods, write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.run import RunSettings, evaluate
-from hybridnav.harness.tables import Row, ahead_of_presets, rows_of_methods
+from hybridnav.harness.run import RunSettings, write_records
+from hybridnav.harness.tables import Row, ahead_of_presets
 from tests.harness.small_runs import ROOMS, name_of, run_in, write_map
 
 pytestmark = pytest.mark.usefixtures("here")
@@ -253,7 +251,7 @@ def of_method(folder, name):
 
 def test_what_is_left_is_not_asked(settings, tmp_path):
     folder = tmp_path / "run"
-    made = evaluate(replace(settings, limit_s=2.5 * QUERY_S), folder)
+    made = write_records(replace(settings, limit_s=2.5 * QUERY_S), folder)
     slow = of_method(folder, Slow.name)
     asked = [record for record in slow if record["status"] != "too slow"]
     left = [record for record in slow if record["status"] == "too slow"]
@@ -266,12 +264,12 @@ def test_what_is_left_is_not_asked(settings, tmp_path):
     study = write_outputs(folder)
     assert study.of_method("slow")[0].failures == len(left)
     assert "not asked after 0." in (folder / "summary.md").read_text()
-    assert evaluate(replace(settings, limit_s=2.5 * QUERY_S), folder) == 0
+    assert write_records(replace(settings, limit_s=2.5 * QUERY_S), folder) == 0
     assert made == len(read_records(folder))
 
 
 def test_without_a_limit_everything_is_asked(settings, tmp_path):
-    evaluate(replace(settings, repeat=0), tmp_path / "run")
+    write_records(replace(settings, repeat=0), tmp_path / "run")
     slow = of_method(tmp_path / "run", Slow.name)
     assert {record["status"] for record in slow} == {"no path"}
 
@@ -279,7 +277,7 @@ def test_without_a_limit_everything_is_asked(settings, tmp_path):
 @pytest.mark.parametrize("limit_s", [0.0, -1.0, float("nan")])
 def test_a_limit_is_positive(settings, tmp_path, limit_s):
     with pytest.raises(InvalidValueError, match="the limit must be positive"):
-        evaluate(replace(settings, limit_s=limit_s), tmp_path / "run")
+        write_records(replace(settings, limit_s=limit_s), tmp_path / "run")
 
 
 def test_each_map_may_have_a_scenario_file(settings, tmp_path):
@@ -294,7 +292,7 @@ def test_each_map_may_have_a_scenario_file(settings, tmp_path):
         baselines=("hpa-star",),
         repeat=0,
     )
-    evaluate(both, tmp_path / "run")
+    write_records(both, tmp_path / "run")
     kinds = [
         (record["map"], record["kind"])
         for record in read_records(tmp_path / "run")
@@ -305,4 +303,4 @@ def test_each_map_may_have_a_scenario_file(settings, tmp_path):
     run = json.loads((tmp_path / "run" / "runs.jsonl").read_text())
     assert run["scenarios"] == ["", str(tmp_path / "hall.scen")]
     with pytest.raises(InvalidValueError, match="got 1 for 2 maps"):
-        evaluate(replace(both, scenarios=("hall.scen",)), tmp_path / "run")
+        write_records(replace(both, scenarios=("hall.scen",)), tmp_path / "run")

@@ -8,7 +8,7 @@ import pytest
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError
-from hybridnav.harness import NamedMethod, RunSettings, evaluate
+from hybridnav.harness import NamedMethod, RunSettings, write_records
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.judges import judge_path
 from hybridnav.harness.output import write_outputs
@@ -46,7 +46,9 @@ def test_answers_of_another_form_are_faults_in_words(tmp_path, monkeypatch):
         monkeypatch.setattr(faulty, name, odd, raising=False)
     classes = tuple(f"{faulty.__name__}:{name}" for name in ODD)
     file = str(write_map(tmp_path, ["..", ".."]))
-    evaluate(RunSettings(maps=(file,), presets=(), baselines=classes, pairs=1), tmp_path / "run")
+    write_records(
+        RunSettings(maps=(file,), presets=(), baselines=classes, pairs=1), tmp_path / "run"
+    )
     study = write_outputs(tmp_path / "run")
     for name, (_, words) in ODD.items():
         (outcome,) = (one for one in study.outcomes if one.label == name)
@@ -62,7 +64,7 @@ def test_a_class_without_its_counts_has_no_answers_and_the_run_goes_on(tmp_path,
     monkeypatch.setattr(faulty, "nodeless", nodeless, raising=False)
     named = (f"{faulty.__name__}:nodeless",)
     file = str(write_map(tmp_path, ["...", "..."]))
-    evaluate(RunSettings(maps=(file,), presets=(), baselines=named, pairs=2), tmp_path / "run")
+    write_records(RunSettings(maps=(file,), presets=(), baselines=named, pairs=2), tmp_path / "run")
     found = {one["status"] for one in read_records(tmp_path / "run") if one["method"] == named[0]}
     assert found == {"error"}
 
@@ -75,7 +77,7 @@ def test_a_process_that_ends_says_how(tmp_path, monkeypatch):
         NamedMethod("class", name_of(faulty.Ends), name, {"how": name}) for name in ends
     )
     file = str(write_map(tmp_path, ["...", "..."]))
-    evaluate(RunSettings(maps=(file,), presets=(), methods=methods, pairs=1), tmp_path / "run")
+    write_records(RunSettings(maps=(file,), presets=(), methods=methods, pairs=1), tmp_path / "run")
     pairs = [one for one in read_records(tmp_path / "run") if one["type"] == "pair"]
     said = {one["method"]: one.get("error") for one in pairs}
     assert said["exit"] == "its process ended with exit code 3"

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.harness.analysis import load_study, to_frame
-from hybridnav.harness.columns import rows_of_study
+from hybridnav.harness.analysis import load_study, rows_of_study, to_frame
 from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import read_records
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.maps import CellClass
 from tests.harness import faulty_methods as faulty
 from tests.harness.small_runs import ROOMS, name_of, outcome_of, run_in, write_map
@@ -110,7 +109,7 @@ def test_by_costs_the_loss_of_a_plan_is_one_of_costs(tmp_path):
         pairs=5,
         costs=("clearance",),
     )
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     (row,) = (r for r in rows_of_study(load_study(tmp_path / "run")) if r["method"] == "PlansAlone")
     assert float(row["loss of the plan %"]) >= 0
     records = [r for r in read_records(tmp_path / "run") if r["status"] == "planned"]

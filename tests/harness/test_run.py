@@ -22,7 +22,7 @@ from hybridnav.harness.compare import compare_runs
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.harness.scenes import sample_pairs
 from hybridnav.maps.files import load_map
 from tests.harness import faulty_methods as faulty
@@ -63,7 +63,7 @@ def unbroken(settings, tmp_path_factory):
     """The folder of a run that nothing disturbed."""
     folder = tmp_path_factory.mktemp("unbroken")
     seen = []
-    assert evaluate(settings, folder, progress=lambda *counts: seen.append(counts)) == total(4)
+    assert write_records(settings, folder, progress=lambda *counts: seen.append(counts)) == total(4)
     assert seen == sorted(seen)
     assert seen[-1] == (total(4), total(4))
     return folder
@@ -121,7 +121,7 @@ def test_a_run_that_is_killed_twice_has_the_records_of_an_unbroken_one(
     # The worst that a kill leaves: a line of which a part was written.
     path.write_bytes(there + b'{"id":"56e15eb')
     before = there.count(b"\n")
-    assert evaluate(settings, tmp_path) == total(4) - before
+    assert write_records(settings, tmp_path) == total(4) - before
     assert path.read_bytes().startswith(there)
     assert timeless(tmp_path) == timeless(unbroken)
 
@@ -133,14 +133,14 @@ def test_a_run_checks_the_same_sample_wherever_it_was_broken_off(
     lines = (unbroken / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     of_reference = [line for line in lines if json.loads(line)["method"] == REFERENCE]
     (tmp_path / RECORDS_FILE).write_bytes(b"".join(of_reference[:count]))
-    evaluate(settings, tmp_path)
+    write_records(settings, tmp_path)
     assert timeless(tmp_path) == timeless(unbroken)
 
 
 def test_a_run_that_is_complete_makes_no_record(settings, unbroken):
     before = (unbroken / RECORDS_FILE).read_bytes()
     began = time.monotonic()
-    assert evaluate(settings, unbroken) == 0
+    assert write_records(settings, unbroken) == 0
     assert time.monotonic() - began < 2  # no process was started
     assert (unbroken / RECORDS_FILE).read_bytes() == before
 
@@ -148,7 +148,7 @@ def test_a_run_that_is_complete_makes_no_record(settings, unbroken):
 def test_a_method_more_costs_that_method_only(settings, unbroken, tmp_path):
     (tmp_path / RECORDS_FILE).write_bytes((unbroken / RECORDS_FILE).read_bytes())
     more = replace(settings, baselines=(*settings.baselines, "grid-dijkstra"), workers=2)
-    assert evaluate(more, tmp_path) == total(1)
+    assert write_records(more, tmp_path) == total(1)
     before = timeless(unbroken)
     after = timeless(tmp_path)
     assert {name: after[name] for name in before} == before
@@ -158,9 +158,9 @@ def test_a_method_more_costs_that_method_only(settings, unbroken, tmp_path):
 def test_a_map_that_changed_is_another_map(settings, tmp_path):
     path = write_map(tmp_path, ROOMS)
     only = replace(settings, maps=(str(path),), presets=(), baselines=(), pairs=3)
-    made = evaluate(only, tmp_path / "run")
+    made = write_records(only, tmp_path / "run")
     write_map(tmp_path, ROOMS[::-1])
-    assert evaluate(only, tmp_path / "run") == made
+    assert write_records(only, tmp_path / "run") == made
 
 
 # --- workers that die or hang -------------------------------------------------------------------
@@ -178,13 +178,13 @@ def test_a_worker_that_fails_costs_one_query(settings, tmp_path, monkeypatch, me
     only = replace(settings, presets=(), baselines=(name_of(method),), timeout_s=10.0)
     if method is not faulty.Hangs:
         only = replace(only, timeout_s=100.0 if method is faulty.Dies else 20.0)
-    assert evaluate(only, tmp_path) == total(2)
+    assert write_records(only, tmp_path) == total(2)
     records = timeless(tmp_path).values()
     failed = [record for record in records if record["status"] == status]
     assert [(tuple(r["start"]), tuple(r["goal"])) for r in failed] == [(fatal.start, fatal.goal)]
     assert {r["status"] for r in records} == {"ready", "solved", "no path", status}
     # What is lost stays lost: it is not tried again.
-    assert evaluate(only, tmp_path) == 0
+    assert write_records(only, tmp_path) == 0
     study = write_outputs(tmp_path)
     assert study.faults == []
     assert sum(outcome.failures for outcome in study.outcomes) == 1
@@ -196,7 +196,7 @@ def test_a_process_that_dies_before_it_is_ready_is_given_up(settings, tmp_path, 
     monkeypatch.setenv(faulty.FATAL_PAIR, "2,2>2,2")
     baselines = (name_of(faulty.Dies), "grid-dijkstra")
     only = replace(settings, presets=(), baselines=baselines, pairs=5)
-    evaluate(only, tmp_path)
+    write_records(only, tmp_path)
     outcomes = write_outputs(tmp_path).outcomes
     ready = {outcome.label: outcome.preparation["status"] for outcome in outcomes}
     assert ready == {"grid-astar": "ready", "grid-dijkstra": "ready", name_of(faulty.Dies): "lost"}
@@ -209,7 +209,7 @@ def test_a_process_that_dies_before_it_is_ready_is_given_up(settings, tmp_path, 
 def test_settings_of_workers_out_of_range(settings, tmp_path, workers, timeout_s):
     wrong = replace(settings, workers=workers, timeout_s=timeout_s)
     with pytest.raises(InvalidValueError, match="at least one worker and a positive timeout"):
-        evaluate(wrong, tmp_path)
+        write_records(wrong, tmp_path)
 
 
 def test_no_task_needs_no_process():
@@ -235,9 +235,9 @@ def test_what_cannot_be_evaluated_is_said_before_anything_runs(settings, rooms, 
     }
     for words, (these, error) in wrong.items():
         with pytest.raises(error, match=words):
-            evaluate(these, tmp_path / "run")
+            write_records(these, tmp_path / "run")
     with pytest.raises(InvalidValueError, match=r"folder .*file"):
-        evaluate(settings, file)
+        write_records(settings, file)
     assert not (tmp_path / "run" / RECORDS_FILE).exists()
 
 
@@ -246,7 +246,7 @@ def test_a_map_without_a_free_cell_has_preparations_only(settings, tmp_path):
     path = write_map(tmp_path, ["##", "##"], name="full")
     single = write_map(tmp_path, ["#.#"], name="single")
     only = replace(settings, maps=(str(path), str(single)), baselines=("hpa-star", "simple-graph"))
-    assert evaluate(only, tmp_path / "run") == 8
+    assert write_records(only, tmp_path / "run") == 8
     records = read_records(tmp_path / "run")
     assert {(record["type"], record["status"]) for record in records} == {("preparation", "ready")}
     assert write_outputs(tmp_path / "run").faults == []
@@ -258,10 +258,10 @@ def test_an_infinite_merge_distance_is_written_as_json(settings, rooms, tmp_path
     preset.write_text("pyramid: {merge_distance_m: .inf}\n")
     ros = ROOT / "maps" / "figure1" / "figure1.yaml"
     only = replace(settings, maps=(str(ros),), presets=(str(preset),), baselines=(), pairs=3)
-    evaluate(replace(only, merge_distance_m=None), tmp_path / "run")
+    write_records(replace(only, merge_distance_m=None), tmp_path / "run")
     record = next(r for r in read_records(tmp_path / "run") if r.get("preset"))
     assert record["preset"]["pyramid"]["merge_distance_m"] is None
-    evaluate(replace(only, merge_distance_m=math.inf, maps=(str(rooms),)), tmp_path / "other")
+    write_records(replace(only, merge_distance_m=math.inf, maps=(str(rooms),)), tmp_path / "other")
     for run in ("run", "other"):
         json.loads((tmp_path / run / "runs.jsonl").read_text(), parse_constant=pytest.fail)
         assert write_outputs(tmp_path / run).faults == []
@@ -271,9 +271,9 @@ def test_an_infinite_merge_distance_is_written_as_json(settings, rooms, tmp_path
 def test_corner_cutting_breaks_the_consistency_of_a_run(settings, tmp_path):
     path = write_map(tmp_path, ["...###", "...###", "###...", "###..."])
     only = replace(settings, maps=(str(path),), baselines=(), pairs=10)
-    evaluate(only, tmp_path / "run")
+    write_records(only, tmp_path / "run")
     assert write_outputs(tmp_path / "run").faults == []
-    evaluate(replace(only, corner_cutting=True), tmp_path / "cut")
+    write_records(replace(only, corner_cutting=True), tmp_path / "cut")
     study = write_outputs(tmp_path / "cut")
     found = {(outcome.label, fault) for outcome, _, fault in study.faults}
     assert ("paper", "solvability: moves join two cells, regions do not") in found
@@ -304,7 +304,7 @@ def test_a_run_equals_itself(unbroken):
 @pytest.mark.usefixtures("here")
 def test_the_difference_of_two_settings_is_second_minus_first(settings, unbroken, tmp_path):
     other = replace(settings, baselines=(), merge_distance_m=2.0)
-    evaluate(other, tmp_path)
+    write_records(other, tmp_path)
     (row,) = rows_of(unbroken, tmp_path)
     (back,) = rows_of(tmp_path, unbroken)
     assert row["method"] == "paper"
@@ -324,7 +324,7 @@ def test_the_difference_of_two_settings_is_second_minus_first(settings, unbroken
 @pytest.mark.usefixtures("here")
 def test_runs_with_nothing_in_common(settings, unbroken, tmp_path):
     ros = ROOT / "maps" / "figure1" / "figure1.yaml"
-    evaluate(replace(settings, maps=(str(ros),), baselines=(), pairs=3), tmp_path / "other")
+    write_records(replace(settings, maps=(str(ros),), baselines=(), pairs=3), tmp_path / "other")
     with pytest.raises(InvalidValueError, match="share no method, map and pair"):
         compare_runs(unbroken, tmp_path / "other")
     for folder in (tmp_path, tmp_path / "nowhere", Path(__file__)):

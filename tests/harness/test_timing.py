@@ -16,7 +16,7 @@ from hybridnav.harness.baselines.grid import GridAstar as Baseline
 from hybridnav.harness.methods import baseline_spec
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
-from hybridnav.harness.run import RunSettings, evaluate
+from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.harness.scenes import MapSpec, Pair, read_scene, sample_pairs
 from hybridnav.harness.timing import TimingTask, circumstances_of
 from hybridnav.maps.files import load_map
@@ -47,7 +47,7 @@ def timed(folder):
 
 @pytest.mark.usefixtures("here")
 def test_times_are_medians_of_all_methods_on_every_pair(settings, tmp_path):
-    made = evaluate(settings, tmp_path / "run")
+    made = write_records(settings, tmp_path / "run")
     assert made == 3 * (1 + ANSWERS) + 1 + ANSWERS
     head, *pairs = timed(tmp_path / "run")
     assert len(head["methods"]) == 3
@@ -115,27 +115,27 @@ def test_the_order_of_methods_is_shuffled_by_a_seed(settings, monkeypatch):
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("left", [1, 2, 7])
 def test_a_pass_that_was_broken_off_goes_on(settings, tmp_path, left):
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     lines = (tmp_path / "run" / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     before = [json.loads(line) for line in lines]
     (tmp_path / "run" / RECORDS_FILE).write_bytes(b"".join(lines[: -ANSWERS - 1 + left]))
-    assert evaluate(settings, tmp_path / "run") == ANSWERS + 1 - left
+    assert write_records(settings, tmp_path / "run") == ANSWERS + 1 - left
     after = read_records(tmp_path / "run")
     plain = [[{k: v for k, v in r.items() if k not in TIMES} for r in rs] for rs in (before, after)]
     assert plain[0] == plain[1]
-    assert evaluate(settings, tmp_path / "run") == 0
+    assert write_records(settings, tmp_path / "run") == 0
 
 
 @pytest.mark.usefixtures("here")
 def test_a_method_more_is_timed_with_the_others_again(settings, tmp_path):
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     more = replace(settings, baselines=(*settings.baselines, "grid-dijkstra"))
-    assert evaluate(more, tmp_path / "run") == 2 * (1 + ANSWERS)
+    assert write_records(more, tmp_path / "run") == 2 * (1 + ANSWERS)
     study = load_study(tmp_path / "run")
     assert study.circumstances.apart == ()
     sizes = {len(r["times"]) for r in timed(tmp_path / "run") if r["type"] == "timed pair"}
     assert sizes == {3, 4}
-    evaluate(replace(settings, baselines=("weighted-astar",), repeat=0), tmp_path / "run")
+    write_records(replace(settings, baselines=("weighted-astar",), repeat=0), tmp_path / "run")
     report = write_outputs(tmp_path / "run").circumstances
     assert report.apart == ("weighted-astar",)
     assert "weighted-astar were not taken beside" in (tmp_path / "run" / "summary.md").read_text()
@@ -147,7 +147,7 @@ def test_a_query_that_was_lost_is_not_asked_again(settings, tmp_path, monkeypatc
     fatal = pairs[N_PAIRS // 2]
     monkeypatch.setenv(faulty.FATAL_PAIR, fatal.key.partition(":")[2])
     run = replace(settings, baselines=(name_of(faulty.Dies),))
-    evaluate(run, tmp_path / "run")
+    write_records(run, tmp_path / "run")
     found = timed(tmp_path / "run")
     assert {record["status"] for record in found} == {"ready", "timed"}
     sizes = {(tuple(r["start"]), tuple(r["goal"])): len(r["times"]) for r in found[1:]}
@@ -157,7 +157,7 @@ def test_a_query_that_was_lost_is_not_asked_again(settings, tmp_path, monkeypatc
 
 @pytest.mark.usefixtures("here")
 def test_a_busy_machine_is_a_warning(settings, tmp_path):
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     path = tmp_path / "run" / RECORDS_FILE
     for load, is_busy in ((0.9, False), (1.4, False), (1.9, True)):
         records = [r | ({"load": load} if "load" in r else {}) for r in read_records(path.parent)]
@@ -205,13 +205,13 @@ def test_the_load_of_the_answers_before_is_not_that_of_the_pass(before, within, 
 
 @pytest.mark.usefixtures("here")
 def test_without_repeats_the_report_says_how_times_were_taken(settings, tmp_path):
-    evaluate(replace(settings, repeat=0), tmp_path / "run")
+    write_records(replace(settings, repeat=0), tmp_path / "run")
     assert timed(tmp_path / "run") == []
     write_outputs(tmp_path / "run")
     report = (tmp_path / "run" / "report.html").read_text()
     assert "of single queries, one method after the other" in report
     with pytest.raises(InvalidValueError, match="repeats are at least 0, got -1"):
-        evaluate(replace(settings, repeat=-1), tmp_path / "run")
+        write_records(replace(settings, repeat=-1), tmp_path / "run")
 
 
 @pytest.mark.usefixtures("here")
@@ -219,7 +219,7 @@ def test_a_slow_method_is_asked_once_for_all_pairs_but_the_first_two(
     settings, tmp_path, monkeypatch
 ):
     monkeypatch.setattr("hybridnav.harness.timing.LONG_S", 0.0)
-    evaluate(settings, tmp_path / "run")
+    write_records(settings, tmp_path / "run")
     pairs = [record for record in timed(tmp_path / "run") if record["type"] == "timed pair"]
     counts = [{len(times) for times in record["times"].values()} for record in pairs]
     assert counts == [{REPEAT}] * 2 + [{1}] * (ANSWERS - 2)
@@ -228,7 +228,7 @@ def test_a_slow_method_is_asked_once_for_all_pairs_but_the_first_two(
 @pytest.mark.usefixtures("here")
 def test_a_first_query_that_prepares_is_no_long_one(settings, tmp_path):
     class_ = replace(settings, baselines=(name_of(Lazy),))
-    evaluate(class_, tmp_path / "run")
+    write_records(class_, tmp_path / "run")
     pairs = [record for record in timed(tmp_path / "run") if record["type"] == "timed pair"]
     assert {len(times) for record in pairs for times in record["times"].values()} == {REPEAT}
     _, outcome = load_study(tmp_path / "run").outcomes

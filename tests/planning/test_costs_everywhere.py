@@ -18,7 +18,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav import viz
-from hybridnav.harness import RunSettings, evaluate, load_study
+from hybridnav.harness import RunSettings, load_study, write_records
 from hybridnav.maps.costs import cost_along
 from tests.floors import random_floor
 from tests.harness.small_runs import run_here
@@ -294,7 +294,7 @@ def test_the_commands_plan_and_judge_by_costs(
             if HONOUR[preset]:
                 assert cost_m == pytest.approx(least_m, rel=1e-9)
     run = RunSettings(maps=(str(path),), presets=(preset,), pairs=2, costs=(CLEARANCE,))
-    evaluate(replace(run, robot_radius_m=0.0), tmp_path / "run")
+    write_records(replace(run, robot_radius_m=0.0), tmp_path / "run")
     study = load_study(tmp_path / "run")
     assert study.faults == []
     assert study.checks

@@ -115,11 +115,11 @@ def _run(name: str) -> None:
 
 @pytest.fixture(scope="module")
 def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder in which the example of `evaluate` ran, which others of the harness read."""
+    """The folder in which the example of `write_records` ran, which others of the harness read."""
     folder = tmp_path_factory.mktemp("evaluated")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        _run("harness.evaluate")
+        _run("harness.write_records")
     return folder
 
 
@@ -127,9 +127,11 @@ def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_example_prints_what_it_shows(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
-    reads_run = name == "harness.evaluate" or 'Path("run")' in (inspect.getdoc(_thing(name)) or "")
+    reads_run = name == "harness.write_records" or 'Path("run")' in (
+        inspect.getdoc(_thing(name)) or ""
+    )
     monkeypatch.chdir(request.getfixturevalue("evaluated") if reads_run else tmp_path)
-    if name != "harness.evaluate":  # whose example made the run
+    if name != "harness.write_records":  # whose example made the run
         _run(name)
 
 

@@ -27,14 +27,14 @@ LIMITS = {
     "modules of a plan and a picture": 135,
     "imports, % of the code": 9.1,
     "long kernels without headings": 0,
-    "names at the root": 56,
+    "names at the root": 60,
     "parameters of commands, shared ones once": 120,
     "lines of tests": 67_000,
 }
 
 BUDGETS = {
     "_base": (2350, 6),
-    "cli": (3500, 6),
+    "cli": (3530, 6),
     "closures": (1700, 6),
     "ext/agent": (2100, 6),
     "ext/fleet": (10350, 11),
@@ -42,18 +42,18 @@ BUDGETS = {
     "ext/page": (3250, 7),
     "graphs": (6600, 8),
     "guide": (3800, 10),
-    "harness": (8300, 11),
+    "harness": (9100, 11),
     "maps": (5420, 7),
-    "models": (2100, 6),
-    "planning": (6850, 12),
+    "models": (2180, 6),
+    "planning": (6900, 12),
     "pyramid": (4450, 9),
     "reasons": (1250, 6),
     "refine": (6000, 9),
     "rooms": (5700, 9),
     "route": (1000, 6),
-    "search": (11850, 9),
+    "search": (12000, 9),
     "topology": (720, 6),
-    "viz": (4850, 6),
+    "viz": (5330, 6),
 }
 """Lines of each package at most, and floors in it: 6 are wanted, where there are more none is
 added."""

@@ -6,7 +6,8 @@ registered like a package of others, in `pyproject.toml`:
 * `hybridnav.commands`: a function, or a `typer.Typer`, by the name of the command;
 * `hybridnav.formats`: a function that reads a map, by its suffix, such as `.hnm`, with the
   parameters of `load_map`; or a module that recognises and reads files of a kind;
-* `hybridnav.methods`: a class of routes or of methods of the harness.
+* `hybridnav.methods`: a class of routes or of methods of the harness;
+* `hybridnav.pictures`: `html`, which draws a value for a notebook.
 """
 
 from functools import cache
@@ -34,3 +35,9 @@ def extension(group: str, name: str) -> Any:
             f"nothing is registered as {name} in hybridnav.{group}: install hybridnav again"
         )
     return found.load()
+
+
+def in_html(value: object) -> str | None:
+    """Return what a notebook shows of a value, None where no pictures are registered."""
+    found = extensions("pictures").get("html")
+    return None if found is None else str(found.load()(value))

@@ -219,7 +219,7 @@ def _yardstick(metric: str) -> Yardstick:
 
 
 def _run(settings: RunSettings, out: Path) -> None:
-    from hybridnav.harness.run import evaluate as run  # noqa: PLC0415
+    from hybridnav.harness.run import write_records as run  # noqa: PLC0415
 
     with progress_bar("records") as advance:
         run(settings, out, progress=advance)

@@ -247,9 +247,9 @@ def explain(
         for leg, names in zip(_results(outcome), itertools.pairwise(query.waypoints), strict=False):
             if leg.start is None or leg.goal is None or leg.solved != outcome.solved:
                 continue
-            source = leg.proof_source
+            source = leg.ground
             # All that is closed but the way out of a zone that the leg leaves.
-            shut: Any = closed if leg.leaves_m is None or source is None else source[2]
+            shut: Any = closed if leg.leaves_m is None or source is None else source.closed
             named: Any = names if may_choose else (None, None)
             reasons.append(explain_solved(planner, (leg.start, leg.goal), named, blocked=shut))
     tightest = min(reasons, key=lambda reason: reason.widest_m, default=None)

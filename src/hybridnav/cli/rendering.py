@@ -12,13 +12,12 @@ import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli.common import answer, extent_line, islands_line, timings
 from hybridnav.cli.options import closing_lines, profile_lines
+from hybridnav.planning.text import rounded_bound
 
 Waypoint = str | tuple[float, ...]
 """A name, or `(x, y)` or `(x, y, yaw)` in metres and radians, map frame."""
 _BY_COSTS = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of paths by costs, which are metres as lengths are."""
-_OPTIMAL = 1e-9
-"""Gap of a path that equals its bound, lengths being sums of rounded numbers."""
 
 
 def respond(
@@ -222,16 +221,3 @@ def _measured(figures: dict[str, Any]) -> list[str]:
         *lines,
         f"bound      {least} {unit}({metric}), this path is {stated} between its waypoints",
     ]
-
-
-def rounded_bound(bound: float, cost: float) -> tuple[str, str]:
-    """Return a bound, and how far a path is at most from the optimum, rounded to the safe side.
-
-    The bound of an optimal path is its length, and rounded like that.
-    """
-    if cost <= bound * (1 + _OPTIMAL):
-        return f"{cost:.2f}", "optimal"
-    if bound <= 0:
-        return "0.00", "not proved to be near the optimum"
-    low = math.floor(bound * 100) / 100
-    return f"{low:.2f}", f"at most {math.ceil((cost / bound - 1) * 1000) / 10:.1f} % too long"

@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import hybridnav as hn
-from hybridnav._base.files import printable
+from hybridnav._base.files import printable, replace_file
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
     UsageError,
@@ -26,6 +26,8 @@ from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption, option
 from hybridnav.cli.reading import grow_topology, read_preset
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from hybridnav.search.descent import WatchedDescent
 
 LevelOption = Annotated[
@@ -38,11 +40,19 @@ LevelOption = Annotated[
 WatchOption = Annotated[
     tuple[str, Path] | None,
     option(
-        "--watch descent FILE",
-        "Draw how `paper` comes down the levels on a long way, by the preset if it is of `paper`: "
-        ".gif, or a strip, .png.",
+        "--watch WHAT FILE",
+        "Draw what moves, on a long way: growth of the pyramid, descent by `paper`, search by A* "
+        "and `octile`, proof of `octile`; .gif, or .html with a slider. A descent also as a strip, "
+        ".png; a search also as .trace.json for Posthoc.",
     ),
 ]
+_WATCHED = {
+    "growth": (".gif", ".html"),
+    "descent": (".gif", ".html", ".png", ".pdf", ".svg"),
+    "search": (".gif", ".html", ".trace.json"),
+    "proof": (".gif", ".html"),
+}
+"""What `--watch` draws, and the endings of its files."""
 ProofArgument = Annotated[
     Path,
     typer.Argument(metavar="PROOF", help="JSON of hybridnav plan --proof, or of PlanResult.proof."),
@@ -67,9 +77,12 @@ def show(args: ShowOptions) -> None:
     level, watch = args.level, args.watch
     check_picture(args.plot)
     if watch is not None:
-        if watch[0] != "descent":
-            raise UsageError(f"--watch must be 'descent FILE', got {printable(watch[0])!r:.80}")
-        check_output(watch[1], "--watch", (".gif", ".png", ".pdf", ".svg"))
+        if watch[0] not in _WATCHED:
+            known = ", ".join(_WATCHED)
+            raise UsageError(f"--watch draws one of {known}, got {printable(watch[0])!r:.80}")
+        if not watch[1].name.lower().endswith(".trace.json") or watch[0] != "search":
+            endings = [ending for ending in _WATCHED[watch[0]] if ending.count(".") == 1]
+            check_output(watch[1], "--watch", tuple(endings))
     settings = args.settings()
     seconds: dict[str, float] = {}
     model = args.load(settings, seconds)
@@ -82,40 +95,80 @@ def show(args: ShowOptions) -> None:
         raise UsageError(f"--level must be from {-len(pyramid)} to {len(pyramid) - 1}, got {level}")
     if not model.is_filed:
         seconds = {"load": seconds["load"], **pyramid.stats.seconds}
-    shown, descent = pyramid[level], None if watch is None else _watched(pyramid, settings)
+    shown, draw = pyramid[level], None if watch is None else _watched(watch, pyramid, settings)
     parts = [_describe_map(pyramid), _describe_levels(pyramid, shown), _describe_level(shown)]
     answer("\n\n".join(parts) + f"\nseconds    {timings(seconds)}\n")
     if args.plot is not None:
-        from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
-
-        viz.save_figure(viz.plot_level(shown), args.plot)
-    if watch is not None and descent is not None:
-        from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
-
-        if watch[1].suffix.lower() == ".gif":
-            viz.save_descent(pyramid.grid, descent, watch[1])
-        else:
-            viz.save_figure(viz.plot_descent(pyramid.grid, descent)[0], watch[1])
+        viz().save_figure(viz().plot_level(shown), args.plot)
+    if draw is not None:
+        draw()
 
 
-def _watched(pyramid: hn.DualGraphPyramid, preset: hn.Preset) -> WatchedDescent:
-    """Return the descent between two cells that are far apart by the way between them.
+def _watched(
+    watch: tuple[str, Path], pyramid: hn.DualGraphPyramid, preset: hn.Preset
+) -> Callable[[], object]:
+    """Return what draws what is to be watched, between two cells that are far apart by the way
+    between them.
 
-    `preset`: one of method `paper`, else that of the package is taken.
+    `preset`: for a descent one of method `paper`, else that of the package is taken.
     """
-    from hybridnav.search.descent import Descent  # noqa: PLC0415
+    (what, file), grid = watch, pyramid.grid
+    if what == "growth":
+        return lambda: viz().save_growth(pyramid, file)
     from hybridnav.search.grid_search import far_apart  # noqa: PLC0415
 
-    if preset.planner.method != "paper":
-        preset = hn.load_preset("paper")
-    grid = pyramid.grid
     enterable = grid.enterable(allow_unexplored=preset.planner.allow_unexplored)
     if not enterable.any():
         raise UsageError(f"--watch: map {printable(grid.name)} has no free cell to plan from")
+    ends = far_apart(enterable)
+    if what == "descent":
+        descent = _descent(pyramid, preset, ends)
+        if file.suffix.lower() in {".gif", ".html"}:
+            return lambda: viz().save_descent(grid, descent, file)
+        return lambda: viz().save_figure(viz().plot_descent(grid, descent)[0], file)
+    own = preset.planner.allow_unexplored
+    octile = hn.load_preset("octile", overrides=[f"planner.allow_unexplored={str(own).lower()}"])
+    planner = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=octile)
+    if what == "search":
+        return _searches(grid, planner, ends, file)
+    start, goal = map(tuple, grid.frame.points_of(ends).tolist())
+    proof = hn.prove(planner.plan(start, goal))
+    return lambda: viz().save_proof(grid, proof, file)
+
+
+def viz() -> Any:
+    """Return the pictures, which load matplotlib."""
+    from hybridnav import viz as pictures  # noqa: PLC0415 - on demand
+
+    return pictures
+
+
+def _searches(
+    grid: hn.OccupancyGrid, planner: hn.HybridPlanner, ends: Any, file: Path
+) -> Callable[[], object]:
+    """Return what draws A* and the search of `octile`, or writes a trace of the former."""
+    from hybridnav.search.grid_search import GridSearch  # noqa: PLC0415
+
+    allowed = planner.preset.planner.allow_unexplored
+    astar = GridSearch(grid.enterable(allow_unexplored=allowed)).watch(*ends)
+    if file.suffix.lower() == ".json":
+        text = json.dumps(astar.trace(grid.shape), separators=(",", ":"))
+        return lambda: replace_file(file, text.encode())
+    jumps: Any = planner.method.prepare()
+    records = {"A*": astar, "octile": jumps.watch(*ends)}
+    return lambda: viz().save_search(grid, records, file)
+
+
+def _descent(pyramid: hn.DualGraphPyramid, preset: hn.Preset, ends: Any) -> WatchedDescent:
+    """Return the descent between two cells, by a preset of method `paper`."""
+    from hybridnav.search.descent import Descent  # noqa: PLC0415
+
+    if preset.planner.method != "paper":
+        preset = hn.load_preset("paper")
     descent = hn.HybridPlanner(hn.TopologicalMap(pyramid), preset=preset).method.prepare()
     if not isinstance(descent, Descent):
         raise UsageError("--watch: the preset has levels: places, which is one step, not a descent")
-    watched = descent.watch(*far_apart(enterable))
+    watched = descent.watch(*ends)
     assert watched is not None  # noqa: S101 - there is a way between both
     return watched
 
@@ -187,7 +240,7 @@ def _describe_level(level: hn.Level) -> str:
 
 preset = typer.Typer(
     name="preset",
-    help="List, print and check presets.",
+    help="List, print and check presets.\n\nExample: hybridnav preset show robot",
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,

@@ -257,7 +257,7 @@ def compile_model() -> None:
 
 def compile_harness() -> None:
     """Compile what evaluates presets and the package's own baselines."""
-    from hybridnav.harness import RunSettings, evaluate  # noqa: PLC0415 - on demand
+    from hybridnav.harness import RunSettings, write_records  # noqa: PLC0415 - on demand
     from hybridnav.harness.methods import BASELINES  # noqa: PLC0415
 
     own = (name for name, (path, _) in BASELINES.items() if path.startswith("hybridnav."))
@@ -265,7 +265,7 @@ def compile_harness() -> None:
         file = Path(folder) / "small.map"
         file.write_text("type octile\nheight 3\nwidth 5\nmap\n.....\n.@.@.\n...@.\n")
         settings = RunSettings(maps=(str(file),), presets=("paper",), baselines=tuple(own), pairs=9)
-        evaluate(settings, Path(folder) / "run")
+        write_records(settings, Path(folder) / "run")
 
 
 def _end_with_parent() -> None:

@@ -4,7 +4,8 @@ from .names import NamedMethod as NamedMethod
 from .judges import Clearance as Clearance, Contact as Contact
 from .recorded import Detour as Detour, JudgedPath as JudgedPath
 from .output import write_outputs as write_outputs
-from .run import RunSettings as RunSettings, evaluate as evaluate
+from .one_call import evaluate as evaluate
+from .run import RunSettings as RunSettings, write_records as write_records
 from .workers import distances_on_cluster as distances_on_cluster
 from .yardstick import AnyAngleOptimum as AnyAngleOptimum
 

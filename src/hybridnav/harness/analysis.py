@@ -4,6 +4,7 @@ and `to_frame`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,9 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridnav._base.extension import in_html
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.columns import EFFICIENCY_COLUMNS, figures
 from hybridnav.harness.methods import BASELINES, REFERENCE
-from hybridnav.harness.outcome import MapQuery, Outcome
+from hybridnav.harness.outcome import MapQuery, Outcome, not_everywhere, pairs_in_common
 from hybridnav.harness.records import (
     Record,
     commands_of,
@@ -23,34 +27,12 @@ from hybridnav.harness.records import (
     read_records,
     who_of,
 )
+from hybridnav.harness.tables import Row, Table, latex_of, table_of
 from hybridnav.harness.timing import Circumstances, circumstances_of, lay_times
-from hybridnav.harness.yardstick import Yardstick, check_yardstick
+from hybridnav.harness.yardstick import OPTIMA, YARDSTICKS, Yardstick, check_yardstick
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import pandas as pd
-
-    from hybridnav._base.typing import PathLike
-
-
-def not_everywhere(outcomes: Iterable[Outcome]) -> set[str]:
-    """Return the labels of methods that were not asked on some of the maps, by their own limits."""
-    return {outcome.label for outcome in outcomes if not outcome.is_asked}
-
-
-def pairs_in_common(outcomes: Iterable[Outcome]) -> set[MapQuery]:
-    """Return the pairs that all methods solved; methods without a solved pair are left out, and
-    those that were not asked on each of the maps."""
-    solved: dict[str, set[MapQuery]] = {}
-    given = list(outcomes)
-    partly = not_everywhere(given)
-    for outcome in given:
-        if outcome.label in partly:
-            continue
-        solved.setdefault(outcome.label, set()).update(outcome.solved_keys)
-    known = [pairs for pairs in solved.values() if pairs]
-    return set.intersection(*known) if known else set()
 
 
 @dataclass
@@ -79,6 +61,40 @@ class Study:
     def common(self) -> set[MapQuery]:
         """The pairs that all methods solved, on all maps."""
         return pairs_in_common(self.outcomes)
+
+    @cached_property
+    def losses(self) -> dict[str, FloatArray]:
+        """Losses of each method over the pairs in common, for `viz.plot_losses`: over the any-angle
+        optimum, or that of `metric`. A method without paths has none."""
+        optimum = YARDSTICKS[self.metric][0]
+        parts: dict[str, list[FloatArray]] = {}
+        for outcome in self.outcomes:
+            if outcome.is_asked and not outcome.has_plans_alone:
+                found = outcome.losses_over(optimum)[outcome.among(self.common)]
+                parts.setdefault(outcome.label, []).append(found)
+        known = {label: np.concatenate(losses) for label, losses in parts.items()}
+        return {label: losses for label, losses in known.items() if np.isfinite(losses).any()}
+
+    @cached_property
+    def table(self) -> Table:
+        """A row for each method: what it solved, its losses, its times, and its contradictions."""
+        optimum = YARDSTICKS[self.metric][0]
+        losses = (f"{optimum} loss mean %", f"{optimum} loss max %")
+        columns = ("metric", "solved %", *losses, "query ms, median", "preparation s", "faults")
+        caption = f"{len(self.common):,} pairs that all solved; loss over {OPTIMA[optimum]}"
+        return table_of(rows_of_study(self), columns, caption)
+
+    def __str__(self) -> str:
+        """Return the table, and how many pairs it is about."""
+        return str(self.table)
+
+    def _repr_html_(self) -> str | None:
+        """Return the losses as a picture and the table for a notebook, if pictures are there."""
+        return in_html(self)
+
+    def to_latex(self) -> str:
+        """Return the table for LaTeX, with the rules of the package booktabs."""
+        return latex_of(self.table)
 
     @property
     def maps(self) -> list[str]:
@@ -159,7 +175,7 @@ def load_study(
     --------
     >>> from pathlib import Path
     >>> from hybridnav.harness import load_study
-    >>> load_study(Path("run")).labels  # of the example of `evaluate`
+    >>> load_study(Path("run")).labels  # of the example of `write_records`
     ['grid-astar', 'octile']
     """
     check_yardstick(metric)
@@ -241,7 +257,7 @@ def to_frame(study: Study) -> pd.DataFrame:
     --------
     >>> from pathlib import Path
     >>> from hybridnav.harness import load_study, to_frame
-    >>> frame = to_frame(load_study(Path("run")))  # of the example of `evaluate`
+    >>> frame = to_frame(load_study(Path("run")))  # of the example of `write_records`
     >>> frame.groupby("method")["octile_loss"].max().to_dict()
     {'grid-astar': 0.0, 'octile': 0.0}
     """
@@ -253,6 +269,40 @@ def to_frame(study: Study) -> pd.DataFrame:
         ) from error
     parts = [pd.DataFrame(_columns(outcome)) for outcome in study.outcomes if outcome.records]
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+def rows_of_map(study: Study, name: str) -> list[Row]:
+    """Return one row for each method on a map that was asked there."""
+    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
+    reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
+    common = pairs_in_common(outcomes)
+    return [
+        {"map": name, "method": outcome.label, **figures([outcome], reference, common)}
+        for outcome in outcomes
+    ]
+
+
+def rows_of_study(study: Study) -> list[Row]:
+    """Return one row for each method, over all of its maps.
+
+    One that was not asked on some of them has no losses and times here: they would be those of
+    other pairs. The rows of the maps have them.
+    """
+    references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
+    partly = not_everywhere(study.outcomes)
+    rows = []
+    for label in study.labels:
+        outcomes = [outcome for outcome in study.of_method(label) if outcome.is_asked]
+        if not outcomes:
+            continue
+        common = set() if label in partly else study.common
+        there = [references[o.map_name] for o in outcomes if o.map_name in references]
+        row: Row = {"method": label, "maps": len(outcomes)}
+        row |= figures(outcomes, there, common)
+        if label in partly:
+            row |= dict.fromkeys(EFFICIENCY_COLUMNS, math.nan)
+        rows.append(row)
+    return rows
 
 
 def _columns(outcome: Outcome) -> dict[str, object]:

@@ -14,9 +14,7 @@ from operator import attrgetter, methodcaller
 import numpy as np
 
 from hybridnav._base.typing import FloatArray
-from hybridnav.harness.analysis import Study, not_everywhere, pairs_in_common
 from hybridnav.harness.judges import summarise
-from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import EXPANSIONS, MapQuery, Outcome, nanmean, nanquantile
 from hybridnav.harness.records import Record, query_key
 from hybridnav.harness.tables import METHOD_COLUMNS, Row, text_of
@@ -341,37 +339,3 @@ def _break_even(price: float, gain: float) -> float:
 def _ratio(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return quotients, NaN for a zero divisor."""
     return np.divide(first, second, out=np.full(len(first), math.nan), where=second > 0)
-
-
-def rows_of_map(study: Study, name: str) -> list[Row]:
-    """Return one row for each method on a map that was asked there."""
-    outcomes = [outcome for outcome in study.of_map(name) if outcome.is_asked]
-    reference = [outcome for outcome in outcomes if outcome.label == REFERENCE]
-    common = pairs_in_common(outcomes)
-    return [
-        {"map": name, "method": outcome.label, **figures([outcome], reference, common)}
-        for outcome in outcomes
-    ]
-
-
-def rows_of_study(study: Study) -> list[Row]:
-    """Return one row for each method, over all of its maps.
-
-    One that was not asked on some of them has no losses and times here: they would be those of
-    other pairs. The rows of the maps have them.
-    """
-    references = {outcome.map_name: outcome for outcome in study.of_method(REFERENCE)}
-    partly = not_everywhere(study.outcomes)
-    rows = []
-    for label in study.labels:
-        outcomes = [outcome for outcome in study.of_method(label) if outcome.is_asked]
-        if not outcomes:
-            continue
-        common = set() if label in partly else study.common
-        there = [references[o.map_name] for o in outcomes if o.map_name in references]
-        row: Row = {"method": label, "maps": len(outcomes)}
-        row |= figures(outcomes, there, common)
-        if label in partly:
-            row |= dict.fromkeys(EFFICIENCY_COLUMNS, math.nan)
-        rows.append(row)
-    return rows

@@ -6,15 +6,17 @@ import math
 
 import numpy as np
 
-from hybridnav._base.typing import PathLike
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.judges import paired_difference
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.outcome import Outcome, loss_of, nanmean
 from hybridnav.harness.records import query_key
-from hybridnav.harness.tables import Row, _Sample
+from hybridnav.harness.tables import Row
 from hybridnav.harness.yardstick import OPTIMA, Optimum, Yardstick
+
+_Sample = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both") -> list[Row]:
@@ -47,7 +49,7 @@ def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both
     --------
     >>> from pathlib import Path
     >>> from hybridnav.harness import compare_runs
-    >>> rows = compare_runs(Path("run"), Path("run"))  # of the example of `evaluate`
+    >>> rows = compare_runs(Path("run"), Path("run"))  # of the example of `write_records`
     >>> rows[0]["pairs"], rows[0]["difference, points"]
     (5, 0.0)
     """

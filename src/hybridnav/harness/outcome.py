@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -321,3 +321,22 @@ def nanquantile(values: FloatArray, share: float) -> float:
     """Return a quantile of the finite values, NaN if there are none."""
     finite = values[np.isfinite(values)]
     return float(np.quantile(finite, share)) if finite.size else math.nan
+
+
+def not_everywhere(outcomes: Iterable[Outcome]) -> set[str]:
+    """Return the labels of methods that were not asked on some of the maps, by their own limits."""
+    return {outcome.label for outcome in outcomes if not outcome.is_asked}
+
+
+def pairs_in_common(outcomes: Iterable[Outcome]) -> set[MapQuery]:
+    """Return the pairs that all methods solved; methods without a solved pair are left out, and
+    those that were not asked on each of the maps."""
+    solved: dict[str, set[MapQuery]] = {}
+    given = list(outcomes)
+    partly = not_everywhere(given)
+    for outcome in given:
+        if outcome.label in partly:
+            continue
+        solved.setdefault(outcome.label, set()).update(outcome.solved_keys)
+    known = [pairs for pairs in solved.values() if pairs]
+    return set.intersection(*known) if known else set()

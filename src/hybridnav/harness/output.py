@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.files import replace_file, without_controls
 from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.harness import columns, tables
-from hybridnav.harness.analysis import Study, load_study, pairs_in_common
+from hybridnav.harness.analysis import Study, load_study, rows_of_map, rows_of_study
 from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.methods import REFERENCE
-from hybridnav.harness.outcome import REGIONS, Outcome, nanmean, nanquantile
+from hybridnav.harness.outcome import REGIONS, Outcome, nanmean, nanquantile, pairs_in_common
+from hybridnav.harness.records import Record
 from hybridnav.harness.report import (
     CaseKey,
     MapSection,
@@ -24,6 +27,8 @@ from hybridnav.harness.report import (
     render_report,
 )
 from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS, Optimum, Yardstick
+from hybridnav.planning import Preset
+from hybridnav.refine.ompl import OmplSettings
 
 _EFFICIENCY = "Efficiency"
 _BY_DISTANCE = "Mean loss over {} in per cent, by length of the octile optimum (pairs)"
@@ -58,13 +63,13 @@ def write_outputs(
     --------
     >>> from pathlib import Path
     >>> from hybridnav.harness import write_outputs
-    >>> write_outputs(Path("run")).faults  # of the example of `evaluate`
+    >>> write_outputs(Path("run")).faults  # of the example of `write_records`
     []
     """
     folder = Path(folder)
     study = load_study(folder, root=root, metric=metric)
-    overall = columns.rows_of_study(study)
-    by_map = {name: columns.rows_of_map(study, name) for name in study.maps}
+    overall = rows_of_study(study)
+    by_map = {name: rows_of_map(study, name) for name in study.maps}
     replace_file(folder / "summary.csv", tables.to_csv(overall).encode())
     every = [row for rows in by_map.values() for row in rows]
     replace_file(folder / "maps.csv", tables.to_csv(every).encode())
@@ -222,9 +227,7 @@ def _machines(study: Study) -> dict[str, str]:
 
 
 def _methods(study: Study) -> tables.Table:
-    return tables.table_of(
-        tables.rows_of_methods(study), tables.METHOD_COLUMNS, "Versions and settings"
-    )
+    return tables.table_of(rows_of_methods(study), tables.METHOD_COLUMNS, "Versions and settings")
 
 
 def _tables(study: Study, rows: Sequence[tables.Row]) -> list[tables.Table]:
@@ -310,3 +313,91 @@ def _drawn(study: Study, outcomes: Iterable[Outcome]) -> dict[str, dict[str, Flo
         if is_known and not (drawn and known.keys() == {REFERENCE}):
             drawn[OPTIMA[optimum]] = known
     return drawn
+
+
+# The methods of a run in a table.
+
+
+def rows_of_methods(study: Study) -> list[tables.Row]:
+    """Return one row for each method of a study."""
+    rows: list[tables.Row] = []
+    for label in study.labels:
+        outcomes = study.of_method(label)
+        # A method that could not be made on a map has no version there.
+        best = max((o.preparation for o in outcomes), key=len)
+        rows.append(
+            {
+                "method": label,
+                "kind": _kind(best),
+                "version": _version(best),
+                "settings": _settings(best),
+                "not asked": _not_asked(outcomes, len(study.maps)),
+            }
+        )
+    return rows
+
+
+def _kind(record: Record) -> str:
+    made_by = str(record.get("made_by", record["method"]))
+    if "graph" in record:
+        return f"graph, {record['graph']['format']}"
+    kind = "class"
+    if record.get("preset") is not None:
+        kind, made_by = "preset", str(record["preset"].get("name", made_by))
+    elif ":" not in made_by:
+        # Earlier versions had names for planners of others, and noted the versions of these.
+        kind = "planner of others" if "version" in record else "baseline"
+    # A class is shown by the name that it gives itself.
+    is_named = made_by != record["method"] or kind == "class"
+    return f"{kind} {made_by}" if is_named else kind
+
+
+def _version(record: Record) -> str:
+    if record.get("version"):
+        return str(record["version"])
+    if "source" in record:
+        return f"file {record['source']}"
+    own = record.get("environment", {}).get("hybridnav", "")
+    return f"hybridnav {own}" if own and "graph" not in record else ""
+
+
+def _settings(record: Record) -> str:
+    given = record.get("settings") or {}
+    if record.get("preset") is not None:
+        given = _unlike(record["preset"].get("planner", {}), _DEFAULTS["planner"])
+    return record.get("settings_text") or _words(given)
+
+
+_DEFAULTS = Preset().model_dump()
+_OF_OMPL = OmplSettings().model_dump() | {"planner": None}
+
+
+def _words(settings: dict[str, Any]) -> str:
+    texts = {
+        key: value if isinstance(value, str) else json.dumps(value)
+        for key, value in settings.items()
+    }
+    return ", ".join(f"{key} {text}" for key, text in texts.items())
+
+
+def _unlike(own: dict[str, Any], usual: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return the settings that differ from the usual ones, by dotted key."""
+    found: dict[str, Any] = {}
+    for key, value in own.items():
+        other = usual.get(key)
+        if isinstance(value, dict):
+            inner = other if isinstance(other, dict) else (_OF_OMPL if key == "ompl" else {})
+            found |= _unlike(value, inner, f"{prefix}{key}.")
+        elif value != other and value is not None:
+            found[f"{prefix}{key}"] = value
+    return found
+
+
+def _not_asked(outcomes: Sequence[Outcome], n_maps: int) -> str:
+    """Return the maps on which a method was not asked, and the reason on the first."""
+    without = [outcome for outcome in outcomes if not outcome.is_asked]
+    if not without:
+        return ""
+    reason = str(without[0].preparation.get("error", ""))
+    where = "" if n_maps == 1 else f"on {len(without)} of {n_maps} maps: "
+    return where + reason

@@ -1,4 +1,6 @@
-"""A run of the harness: maps and methods in, records in a folder out. Public: `evaluate`."""
+"""A run of the harness: maps and methods in, records in a folder out. Public: `RunSettings` and
+`write_records`.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,7 @@ _SAMPLE = 3
 
 @dataclass(frozen=True, kw_only=True)
 class RunSettings:
-    """The maps, methods and pairs of a run; see `evaluate`.
+    """The maps, methods and pairs of a run; see `write_records`.
 
     Examples
     --------
@@ -114,7 +116,9 @@ class RunSettings:
     are left then are recorded as "too slow", and the timing pass leaves it out. None: no limit."""
 
 
-def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no_progress) -> int:
+def write_records(
+    settings: RunSettings, folder: PathLike, *, progress: Progress = no_progress
+) -> int:
     r"""Answer all pairs on all maps by all methods, and append the records to a folder.
 
     Records that exist are kept, so a run that was killed resumes. The baseline "grid-astar" is
@@ -147,10 +151,10 @@ def evaluate(settings: RunSettings, folder: PathLike, *, progress: Progress = no
     Examples
     --------
     >>> from pathlib import Path
-    >>> from hybridnav.harness import RunSettings, evaluate
+    >>> from hybridnav.harness import RunSettings, write_records
     >>> _ = Path("hall.map").write_text("type octile\nheight 2\nwidth 3\nmap\n...\n.@.\n")
     >>> settings = RunSettings(maps=("hall.map",), presets=("octile",), pairs=5)
-    >>> evaluate(settings, "run")
+    >>> write_records(settings, "run")
     12
     """
     path = Path(folder)

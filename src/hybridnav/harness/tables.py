@@ -1,23 +1,17 @@
-"""Tables: CSV for machines, Markdown and HTML for people; the methods of a run in a table."""
+"""Tables: CSV for machines, Markdown, HTML, LaTeX and plain text for people."""
 
 from __future__ import annotations
 
 import csv
 import io
-import json
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.harness.analysis import Study
-from hybridnav.harness.outcome import REGIONS, Outcome
-from hybridnav.harness.records import Record
+from hybridnav.harness.outcome import REGIONS
 from hybridnav.harness.yardstick import OPTIMA
-from hybridnav.planning import Preset
-from hybridnav.refine.ompl import OmplSettings
 
 Row = dict[str, str | float]
 
@@ -105,6 +99,41 @@ class Table:
                     f"expected {len(self.columns)}"
                 )
 
+    def __str__(self) -> str:
+        """Return aligned columns, and the caption below them."""
+        lines = [self.columns, *self.rows]
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        texts = (
+            "  ".join(
+                cell.rjust(width) if at in self.numeric else cell.ljust(width)
+                for at, (cell, width) in enumerate(zip(line, widths, strict=True))
+            ).rstrip()
+            for line in lines
+        )
+        return "\n".join([*texts, self.caption])
+
+
+_LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+}
+"""What LaTeX takes for commands, or prints as something else."""
+
+
+def latex_of(table: Table) -> str:
+    """Return a table for LaTeX with rules of booktabs, every character as it is."""
+    lines = [
+        " & ".join("".join(_LATEX.get(c, c) for c in cell) for cell in line) + r" \\"
+        for line in (table.columns, *table.rows)
+    ]
+    align = "".join("r" if at in table.numeric else "l" for at in range(len(table.columns)))
+    head, *body = lines
+    rows = [r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
+    return "\n".join([rf"\begin{{tabular}}{{{align}}}", *rows, r"\end{tabular}", ""])
+
 
 def table_of(rows: Sequence[Row], columns: Iterable[str], caption: str, note: str = "") -> Table:
     """Return a table without columns that are empty."""
@@ -190,94 +219,3 @@ def _by(column: str, sign: int) -> Any:
 def _has(row: Row, column: str) -> bool:
     value = row.get(column, "")
     return isinstance(value, (int, float)) and math.isfinite(value)
-
-
-def rows_of_methods(study: Study) -> list[Row]:
-    """Return one row for each method of a study."""
-    rows: list[Row] = []
-    for label in study.labels:
-        outcomes = study.of_method(label)
-        # A method that could not be made on a map has no version there.
-        best = max((o.preparation for o in outcomes), key=len)
-        rows.append(
-            {
-                "method": label,
-                "kind": _kind(best),
-                "version": _version(best),
-                "settings": _settings(best),
-                "not asked": _not_asked(outcomes, len(study.maps)),
-            }
-        )
-    return rows
-
-
-def _kind(record: Record) -> str:
-    made_by = str(record.get("made_by", record["method"]))
-    if "graph" in record:
-        return f"graph, {record['graph']['format']}"
-    kind = "class"
-    if record.get("preset") is not None:
-        kind, made_by = "preset", str(record["preset"].get("name", made_by))
-    elif ":" not in made_by:
-        # Earlier versions had names for planners of others, and noted the versions of these.
-        kind = "planner of others" if "version" in record else "baseline"
-    # A class is shown by the name that it gives itself.
-    is_named = made_by != record["method"] or kind == "class"
-    return f"{kind} {made_by}" if is_named else kind
-
-
-def _version(record: Record) -> str:
-    if record.get("version"):
-        return str(record["version"])
-    if "source" in record:
-        return f"file {record['source']}"
-    own = record.get("environment", {}).get("hybridnav", "")
-    return f"hybridnav {own}" if own and "graph" not in record else ""
-
-
-def _settings(record: Record) -> str:
-    given = record.get("settings") or {}
-    if record.get("preset") is not None:
-        given = _unlike(record["preset"].get("planner", {}), _DEFAULTS["planner"])
-    return record.get("settings_text") or _words(given)
-
-
-_DEFAULTS = Preset().model_dump()
-_OF_OMPL = OmplSettings().model_dump() | {"planner": None}
-
-
-def _words(settings: dict[str, Any]) -> str:
-    texts = {
-        key: value if isinstance(value, str) else json.dumps(value)
-        for key, value in settings.items()
-    }
-    return ", ".join(f"{key} {text}" for key, text in texts.items())
-
-
-def _unlike(own: dict[str, Any], usual: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Return the settings that differ from the usual ones, by dotted key."""
-    found: dict[str, Any] = {}
-    for key, value in own.items():
-        other = usual.get(key)
-        if isinstance(value, dict):
-            inner = other if isinstance(other, dict) else (_OF_OMPL if key == "ompl" else {})
-            found |= _unlike(value, inner, f"{prefix}{key}.")
-        elif value != other and value is not None:
-            found[f"{prefix}{key}"] = value
-    return found
-
-
-def _not_asked(outcomes: Sequence[Outcome], n_maps: int) -> str:
-    """Return the maps on which a method was not asked, and the reason on the first."""
-    without = [outcome for outcome in outcomes if not outcome.is_asked]
-    if not without:
-        return ""
-    reason = str(without[0].preparation.get("error", ""))
-    where = "" if n_maps == 1 else f"on {len(without)} of {n_maps} maps: "
-    return where + reason
-
-
-# Two runs side by side, pair by pair, with the significance of their difference.
-
-
-_Sample = tuple["FloatArray", "FloatArray", "FloatArray", "FloatArray"]

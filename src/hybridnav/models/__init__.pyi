@@ -4,6 +4,7 @@ from .export import (
     export_rooms as export_rooms,
 )
 from .model import Model as Model, load as load
+from .one_call import plan as plan
 from .saving import save as save
 
 __all__: list[str]

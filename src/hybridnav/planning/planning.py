@@ -22,7 +22,7 @@ from hybridnav.planning.costs import CostFinish
 from hybridnav.planning.endpoints import check_at, places_of_endpoints, read_ends, refusal
 from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
 from hybridnav.planning.path import path_of
-from hybridnav.planning.result import PlanDraft, Walk
+from hybridnav.planning.result import PlanDraft, PlannedOn, Walk
 from hybridnav.refine import LineOfSight
 from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
@@ -507,7 +507,8 @@ class Planning:
         """Return a result that records endpoints, preset and settings of the pyramid."""
         start, goal = query.poses
         made: Any = {"stats": PlanStats()} if "stats" not in outcome else {}
-        made |= {"proof_source": (self.grid, self.costs, query.closed), "status": status}
+        on = PlannedOn(self.grid, self.costs, query.closed, self.topology)
+        made |= {"ground": on, "status": status}
         made |= {"start": start, "goal": goal}
         return filled(PlanResult, settings=partial(deepcopy, self._settings), **made, **outcome)
 

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 import numpy as np
 
 from hybridnav._base.copies import on_demand
+from hybridnav._base.extension import in_html
 from hybridnav._base.trig import dist
 from hybridnav.errors import PlanError, renamed
+from hybridnav.planning.text import rounded_bound
 from hybridnav.route.route import Route
 from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
 from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
@@ -46,6 +48,19 @@ class RouteSource(Protocol):
     def route(self) -> Route:
         """Find the route."""
         ...
+
+
+class PlannedOn(NamedTuple):
+    """What was planned on: proofs and pictures are made of it."""
+
+    grid: OccupancyGrid
+    """The map."""
+    costs: PlannerCosts
+    """The costs of its cells."""
+    closed: ClosedCells | None
+    """The closed cells of the query."""
+    topology: TopologicalMap | None
+    """The places of the map; None while they are not built."""
 
 
 class Walk(NamedTuple):
@@ -128,11 +143,33 @@ class PlanResult:
     """The explanation, or how to find it."""
     leaves_m: float | None = None
     """Metres from the start out of closed cells, which `leave_zone` opened; None of others."""
-    proof_source: tuple[OccupancyGrid, PlannerCosts, ClosedCells | None] | None = field(
-        default=None, repr=False
-    )
-    """What proofs are made of: the map, the costs, and the closed cells of the query; None in
-    copies of a result."""
+    ground: PlannedOn | None = field(default=None, repr=False)
+    """What was planned on; None in copies of a result."""
+
+    def __repr__(self) -> str:
+        """Return three lines: status, length and preset; the bound; the route and its ends."""
+        stated = f"{self.status} by preset {self.settings.get('preset', 'none')}"
+        start, goal = (
+            "no point" if end is None else f"({', '.join(f'{n:.10g}' for n in end)})"
+            for end in (self.start, self.goal)
+        )
+        between = f"from {start} to {goal}"
+        if self.path is None:
+            return f"{stated}\n{self.reason or 'without a path'}\n{between}"
+        by_costs, bound = self.weighted_cost is not None, "no bound: it does not reach its goal"
+        if self.ends_well:
+            least, how = rounded_bound(self.lower_bound, self.cost)
+            bound = f"none below {least} m: {how.replace('long', 'dear') if by_costs else how}"
+        cost = f", cost {self.cost:.2f} m" if by_costs and self.ends_well else ""
+        ids = () if self.route is None else (self.route.places, self.route.arcs)
+        counts = zip(map(len, ids), ("place", "arc"), strict=False)
+        passed = "".join(f", {n} {what}{'' if n == 1 else 's'}" for n, what in counts)
+        length = f"{self.path.length_m:.2f} m{cost} ({self.metric})"
+        return f"{stated}: {length}\n{bound}\n{between}{passed}"
+
+    def _repr_html_(self) -> str | None:
+        """Return the picture and the lines for a notebook, if pictures are registered."""
+        return in_html(self)
 
     @cached_property
     def lower_bound(self) -> float:
@@ -215,7 +252,7 @@ class PlanResult:
             "bound_source": self.lower_bound,
             "settings": self.settings,
             "why_source": self.explanation,
-            "proof_source": None,
+            "ground": None,
         }
 
     @property

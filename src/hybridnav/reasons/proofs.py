@@ -71,9 +71,9 @@ def prove(result: PlanResult) -> dict[str, Any]:
     >>> check_proof.check(grid.measured, [grid.resolution_m, *origin], proof)[:43]
     'path from [0.5, 0.5] to [2.0, 2.5], radius '
     """
-    if result.proof_source is None:
+    if result.ground is None:
         raise PlanError("copies of a result have no proof: ask the result that was planned")
-    grid, costs, closed = result.proof_source
+    grid, costs, closed, _ = result.ground
     if grid.corner_cutting:
         raise PlanError(
             "no proof is known where corners may be cut: load the map without corner_cutting"

@@ -17,10 +17,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.kernels.moves import BUCKET_FULL, legal_moves, trace_cells
+from hybridnav._base.kernels.moves import (
+    BUCKET_FULL,
+    COL_STEP,
+    DIAGONAL,
+    ROW_STEP,
+    STRAIGHT,
+    legal_moves,
+    trace_cells,
+)
 from hybridnav._base.threads import Pool
+from hybridnav.errors import InvalidValueError
 from hybridnav.search.kernels import grid_search as _kernels
 from hybridnav.search.kernels import waypoints as _waypoint_kernels
+from hybridnav.search.watched import recorded
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.search.watched import SearchRecord
 
 Cell = tuple[int, int]
 
@@ -153,6 +164,35 @@ class GridSearch:
             found = self._path(moves, (first, last), bound, corridor)
             moves[touched] = masks
         return found
+
+    def watch(self, start: Cell, goal: Cell) -> SearchRecord:
+        """Search between two cells by lengths, and return what was reached on the way.
+
+        Raises `InvalidValueError` when the search is by costs.
+        """
+        if self._weights is not None:
+            raise InvalidValueError("a search by costs leaves no record: give it no units")
+        cols, work = self._cols, _Work(len(self._moves))
+        ends = start[0] * cols + start[1], goal[0] * cols + goal[1]
+        cost = BUCKET_FULL
+        while cost == BUCKET_FULL:
+            generation = work.next_generation()
+            tables = move_tables(corner_cutting=self._corner_cutting)
+            of_work = None, None, work.records, generation, work.waiting
+            cost, _ = KERNEL(self._moves, cols, ends, UNLIMITED, *tables, *of_work)
+            work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
+        path: LongArray | None = None if cost < 0 else trace_cells(work.records, cols, *ends)
+        low_bits = 32 - _kernels.GENERATIONS.bit_length()
+        records: LongArray = work.records.astype(np.int64)
+        reached = np.flatnonzero(records >> low_bits == generation)
+        k = records[reached] & 7
+        is_start = reached == ends[0]
+        came = np.where(is_start, ends[0], reached - ROW_STEP[k] * cols - COL_STEP[k])
+        parents = np.where(is_start, -1, np.searchsorted(reached, came))
+        steps = np.where(is_start, 0, np.where(k & 1, DIAGONAL, STRAIGHT))
+        cells = np.stack(np.divmod(reached, cols), axis=1)
+        found = (None, None) if cost < 0 else (int(cost), path)
+        return recorded(cells, parents, steps, np.array(goal), found)
 
     def _path(
         self,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import io
+import json
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -296,11 +298,13 @@ _FRAME_DPI = 100
 def checked_animation(path: PathLike) -> Path:
     """Return the file of an animation.
 
-    Raises `InvalidValueError` when its name does not end in `.gif`.
+    Raises `InvalidValueError` when its name ends in neither `.gif` nor `.html`.
     """
     file = Path(path)
-    if file.suffix.lower() != ".gif":
-        raise InvalidValueError(f"an animation's file name must end in .gif, got '{file}'")
+    if file.suffix.lower() not in {".gif", ".html"}:
+        raise InvalidValueError(
+            f"an animation's file name must end in .gif or .html, got '{file}': name it so"
+        )
     return file
 
 
@@ -309,14 +313,56 @@ def save_frames(figures: Iterable[Figure], milliseconds: list[int], file: Path) 
 
     Raises `InvalidValueError` when the file cannot be written.
     """
-    first, *others = map(_pixels, figures)
-    data = io.BytesIO()
-    look: dict[str, Any] = {"append_images": others, "duration": milliseconds, "loop": 0}
-    first.save(data, "GIF", save_all=True, optimize=True, **look)
+    images = list(map(_pixels, figures))
+    data = _page(images, milliseconds) if file.suffix.lower() == ".html" else None
+    if data is None:
+        stream, (first, *others) = io.BytesIO(), images
+        look: dict[str, Any] = {"append_images": others, "duration": milliseconds, "loop": 0}
+        first.save(stream, "GIF", save_all=True, optimize=True, **look)
+        data = stream.getvalue()
     try:
-        replace_file(file, data.getvalue())
+        replace_file(file, data)
     except OSError as error:
         raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+
+
+def _page(images: list[Image.Image], milliseconds: list[int]) -> bytes:
+    """Return a page with a slider over the images, which asks nobody for anything; a notebook shows
+    it as `IPython.display.HTML(filename=...)`."""
+    frames = []
+    for image in images:
+        stream = io.BytesIO()
+        image.save(stream, "PNG", optimize=True)
+        frames.append(f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}")
+    values = {"frames": frames, "milliseconds": milliseconds}
+    return _PAGE.replace("VALUES", json.dumps(values)).encode()
+
+
+_PAGE = """<!doctype html><meta charset="utf-8"><title>hybridnav</title>
+<figure class="hybridnav-frames" style="margin:0;max-width:60em;font:1em sans-serif">
+<img alt="frame" style="width:100%;background:#fff"><figcaption style="display:flex;gap:.5em">
+<button type="button" aria-label="play or stop">&#9654;</button>
+<input type="range" min="0" value="0" aria-label="frame" style="flex:1"><output></output>
+</figcaption><script type="application/json">VALUES</script></figure><script>
+for (const figure of document.querySelectorAll(".hybridnav-frames:not([data-ready])")) {
+  const [image, play, range, out, values] =
+    ["img", "button", "input", "output", "script"].map((name) => figure.querySelector(name));
+  const { frames, milliseconds } = JSON.parse(values.textContent);
+  let timer = 0;
+  const show = (k) => {
+    range.value = k; image.src = frames[k]; out.value = `${+k + 1} of ${frames.length}`;
+  };
+  const run = () => {
+    timer = setTimeout(() => { show((+range.value + 1) % frames.length); run(); },
+      milliseconds[range.value]);
+  };
+  play.onclick = () => { timer ? (clearTimeout(timer), (timer = 0)) : run(); };
+  range.max = frames.length - 1;
+  range.oninput = () => { clearTimeout(timer); timer = 0; show(range.value); };
+  figure.dataset.ready = true; show(0);
+}
+</script>
+"""
 
 
 def _pixels(figure: Figure) -> Image.Image:

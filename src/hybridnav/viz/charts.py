@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -79,6 +79,16 @@ class MethodStyle:
         )
 
 
+@runtime_checkable
+class HasLosses(Protocol):
+    """What knows the losses of methods, such as a study of the harness."""
+
+    @property
+    def losses(self) -> Mapping[str, ArrayLike]:
+        """For each method the losses of its pairs, as in `plot_losses`."""
+        ...
+
+
 _DASHES = ((), (3.5, 1.5), (1.0, 1.25), (4.5, 1.5, 1.0, 1.5), (2.0, 1.0))
 _MARKERS = "os^DvPX*"
 
@@ -113,7 +123,7 @@ def method_styles(names: Iterable[str]) -> dict[str, MethodStyle]:
 
 
 def plot_losses(
-    losses: Mapping[str, ArrayLike],
+    losses: Mapping[str, ArrayLike] | HasLosses,
     *,
     styles: Mapping[str, MethodStyle] | None = None,
     ax: Axes | None = None,
@@ -128,7 +138,8 @@ def plot_losses(
     Parameters
     ----------
     losses
-        For each method the losses of its pairs, 0.01 for 1 %. Infinite and NaN ones are left out.
+        For each method the losses of its pairs, 0.01 for 1 %; infinite and NaN ones are left out.
+        Or a study.
     styles
         By method, see `method_styles`; by default made here.
     ax
@@ -154,7 +165,8 @@ def plot_losses(
     >>> plot_losses({"paper": [0.0, 0.1, 0.3]}, title="losses").get_title()
     'losses'
     """
-    known = {name: _known(name, values) for name, values in losses.items()}
+    given = losses.losses if isinstance(losses, HasLosses) else losses
+    known = {name: _known(name, values) for name, values in given.items()}
     ax, sizes = _opened(ax, width_in, known, title)
     styles = method_styles(known) if styles is None else styles
     largest = max(1e-2, *(float(values[-1]) for values in known.values()))

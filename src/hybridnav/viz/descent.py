@@ -102,7 +102,8 @@ def save_descent(
     grid, descent
         As for `plot_descent`.
     path
-        A file whose name ends in `.gif`; an existing one is replaced.
+        A file whose name ends in `.gif`, or in `.html` for a page with a slider; an existing one is
+        replaced.
     width_in
         Width in inches; 100 pixels each.
 

@@ -24,6 +24,7 @@ from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_points
 from hybridnav.maps.costs import CostLayer
 from hybridnav.pyramid import Level
+from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import layout, style
 from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
@@ -238,7 +239,10 @@ _PATHS = ("#0b3c8c", "#007f5f", *style.ROUTES[2:])
 
 
 def draw_query(
-    canvas: Canvas, topology: TopologicalMap, costs: CostLayer | None, blocked: Closable | None
+    canvas: Canvas,
+    topology: TopologicalMap,
+    costs: CostLayer | None,
+    blocked: Closable | ClosedCells | None,
 ) -> list[Entry]:
     """Draw what a query was planned with over the cells: costs as shades, closed cells.
 
@@ -256,15 +260,19 @@ def draw_query(
         at = np.where(
             grid.classes == CellClass.FREE, np.asarray(scale(costs.factors)).clip(0, 1), 0.0
         )
-        table = np.round(colormaps["YlOrRd"](np.linspace(0.2, _SHADES[-1], _LEVELS)) * 255)
+        table = np.round(colormaps["BuPu"](np.linspace(0.2, _SHADES[-1], _LEVELS)) * 255)
         shades = table.astype(np.uint8)[np.round(at * (_LEVELS - 1)).astype(np.intp)]
         shades[..., 3] = np.where(at > 0, 255 * (_LEAST_SHADE + (1 - _LEAST_SHADE) * at), 0)
         draw_shades(canvas, grid, shades, gid="costs")
         text = f"a metre costs up to {scale.vmax:.3g}"
-        entries.append((Patch(fc=colormaps["YlOrRd"](_SHADES[-1])), text))
+        entries.append((Patch(fc=colormaps["BuPu"](_SHADES[-1])), text))
         is_closed.flat[costs.inflated(grid).closed_flat] = True
-    if blocked is not None:
-        is_closed.ravel()[as_blocked(blocked).cells_of(topology)] = True
+    given: OneWay | None = None
+    if isinstance(blocked, ClosedCells):
+        is_closed.ravel()[blocked.flat] = True
+    elif blocked is not None:
+        closure = as_blocked(blocked)
+        is_closed.ravel()[closure.cells_of(topology)], given = True, closure.directions
     is_closed &= is_open
     if is_closed.any():
         # A closed door may be a single cell: everything closed is seen on the page.
@@ -274,7 +282,6 @@ def draw_query(
         shades[is_closed] = (*style.rgb(_CLOSED)[0].tolist(), _CLOSED_ALPHA)
         draw_shades(canvas, grid, shades, gid="closed")
         entries.append((Patch(fc=_CLOSED), "closed"))
-    given = None if blocked is None else as_blocked(blocked).directions
     return entries + draw_one_way(canvas, topology, given)
 
 

@@ -20,6 +20,7 @@ from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.planning import COST_METRICS, PlanResult
 from hybridnav.route import Route
+from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
@@ -46,7 +47,7 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     title: str | None = None,
     optimum_m: float | None = None,
     costs: CostLayer | None = None,
-    blocked: Closable | None = None,
+    blocked: Closable | ClosedCells | None = None,
     unexplored: bool = False,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:

@@ -1,9 +1,12 @@
-"""Pictures of paths through rooms: tours from waypoint to waypoint, and alternative routes."""
+"""Pictures of tours and of alternative routes; one call for all that was planned: `plot`."""
 
 from __future__ import annotations
 
+import base64
+import html
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib import patheffects
 from matplotlib.axes import Axes
@@ -11,19 +14,22 @@ from matplotlib.lines import Line2D
 
 from hybridnav._base.typing import FloatArray
 from hybridnav.closures.blocked import Closable
-from hybridnav.guide import Tour
-from hybridnav.guide.alternatives import Alternatives
+from hybridnav.errors import InvalidValueError
+from hybridnav.guide import Alternatives, Tour
 from hybridnav.guide.words.bends import Leg
 from hybridnav.maps.costs import CostLayer
-from hybridnav.planning import COST_METRICS
+from hybridnav.planning import COST_METRICS, PlanResult
 from hybridnav.rooms import Door, Rooms
+from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view, picture_bytes
+from hybridnav.viz.charts import HasLosses, plot_losses
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import draw_query, ground_entries, swatch
 from hybridnav.viz.places import Places
+from hybridnav.viz.plan import plot_paths, plot_plan
 from hybridnav.viz.room_map import DOOR_POINTS, draw_doors, draw_room_cells, room_entry
 
 _TOUR_WIDTH, _WAYPOINT_POINTS = 1.6, 5.0
@@ -49,7 +55,7 @@ def plot_tour(  # noqa: PLR0913 - all but two have defaults
     ax: Axes | None = None,
     title: str | None = None,
     costs: CostLayer | None = None,
-    blocked: Closable | None = None,
+    blocked: Closable | ClosedCells | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw a tour: the rooms as in `plot_rooms`, and the paths from waypoint to waypoint.
@@ -118,7 +124,7 @@ def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
     ax: Axes | None = None,
     title: str | None = None,
     costs: CostLayer | None = None,
-    blocked: Closable | None = None,
+    blocked: Closable | ClosedCells | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw alternative routes, each in its own colour, on rooms or places.
@@ -251,3 +257,93 @@ def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
     """Return the doors that are listed, and all that the path passes."""
     numbers = {door.number for door in (*passed, *rooms.listed_doors)}
     return [door for door in rooms.doors if door.number in numbers]
+
+
+# One call for a picture of what was planned or measured.
+
+_DPI = 100
+"""Pixels per inch of a picture in a notebook."""
+
+
+def plot(
+    shown: PlanResult | Tour | Alternatives | HasLosses,
+    *,
+    ax: Axes | None = None,
+    title: str | None = None,
+    width_in: float = style.FULL_WIDTH_IN,
+) -> Axes:
+    """Draw a plan, a tour, alternatives, or the losses of a study.
+
+    A result knows the map that it was planned on; so do the others by their results. The functions
+    `plot_plan`, `plot_tour`, `plot_alternatives` and `plot_losses` have more settings.
+
+    Parameters
+    ----------
+    shown
+        What to draw, as a planner, `hybridnav.plan` or `hybridnav.evaluate` returned it.
+    ax
+        Axes to draw on; by default new ones in a new figure.
+    title
+        Title instead of the usual one; empty for none.
+    width_in
+        Width of a new figure in inches.
+
+    Returns
+    -------
+    Axes
+        The axes drawn on; `axes.figure` is the figure.
+
+    Raises
+    ------
+    InvalidValueError
+        When it is something else, or a copy of a result, which holds no map.
+
+    Examples
+    --------
+    >>> result = hn.plan(hn.example_map("figure1"), (0.5, 0.5), (2.0, 2.5))
+    >>> hn.plot(result).get_title()
+    'figure1  ·  path 2.5 m  ·  1 place on the route'
+    """
+    look: Any = {"ax": ax, "title": title, "width_in": width_in}
+    if isinstance(shown, HasLosses):
+        return plot_losses(shown, **look)
+    first = shown
+    if isinstance(first, Alternatives):
+        if not first:
+            raise InvalidValueError("there is no route to draw: plan between joined points")
+        first = first[0].tour
+    if isinstance(first, Tour):
+        first = first.results[0]
+    if not isinstance(first, PlanResult):
+        raise InvalidValueError(
+            f"a plan, a tour, alternatives or a study can be drawn, got {shown!r:.80}: for others "
+            "see hybridnav.viz"
+        )
+    ground = first.ground
+    if ground is None:
+        raise InvalidValueError(
+            "a copy of a result, or one read from a file, holds no map: draw the result that was "
+            "planned, or take plot_plan with the map"
+        )
+    topology = ground.topology
+    if topology is None:  # the map changed, and its places are not built yet
+        return plot_paths(ground.grid, [] if first.path is None else first.path.points, **look)
+    on: Any = {"costs": ground.costs.layer, "blocked": ground.closed}
+    if isinstance(shown, PlanResult):
+        for name, end in (("start", shown.start), ("goal", shown.goal)):
+            on[name] = None if end is None else end[:2]
+        return plot_plan(topology, shown, **on, **look)
+    draw: Any = plot_tour if isinstance(shown, Tour) else plot_alternatives
+    return draw(topology, shown, **on, **look)
+
+
+def in_html(shown: Any) -> str:
+    """Return HTML of a plan or a study for a notebook: its picture, and its lines."""
+    text = f"<pre>{html.escape(str(shown))}</pre>"
+    try:
+        png = picture_bytes(plot(shown), ".png", dpi=_DPI)
+    except InvalidValueError:  # a copy, or nothing to draw
+        return text
+    data = base64.b64encode(png).decode()
+    alt = html.escape(str(shown).partition("\n")[0], quote=True)
+    return f'<img alt="{alt}" src="data:image/png;base64,{data}">{text}'

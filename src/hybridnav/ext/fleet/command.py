@@ -14,9 +14,10 @@ from hybridnav.cli import common
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.query import PlanOptions, check_alternatives, checked_at, one_of
 from hybridnav.cli.reading import check_model, read_settings
-from hybridnav.cli.rendering import in_metric, preset_line, rounded_bound
+from hybridnav.cli.rendering import in_metric, preset_line
 from hybridnav.guide.words import check_language
 from hybridnav.maps.names import place_of_name, read_point
+from hybridnav.planning.text import rounded_bound
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.moves import FAR
+from hybridnav._base.moves import DIAGONAL, FAR, STRAIGHT
 from hybridnav._base.threads import SHARES, Pool, cores
 from hybridnav.maps.geometry import centres
-from hybridnav.search.contraction import contract, renumbered
+from hybridnav.search.contraction import NO_ARC, contract, renumbered
 from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import (
     COLUMN_BITS,
@@ -25,11 +25,13 @@ from hybridnav.search.octile.kernels.legs import (
     legs_that_follow,
 )
 from hybridnav.search.octile.kernels.tables import look_ahead, number_cells
+from hybridnav.search.watched import octile_of, recorded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav.search.watched import SearchRecord
 
 
 _SHORT = 32_000
@@ -285,6 +287,32 @@ class JumpSearch:
             return JumpPath(None, math.inf, expanded)
         return JumpPath(cells, straight + diagonal * math.sqrt(2.0), expanded)
 
+    def watch(self, start: Cell, goal: Cell) -> SearchRecord:
+        """Search between two free cells, and return the corner cells that were reached.
+
+        A contracted graph is searched from both ends; the parents of a cell lead to its own end.
+        """
+        graph, work = self.graph, _Work(self.graph.n_corners, len(self.graph.arcs))
+        records, _, touched, _ = work.arrays
+        touched[:] = -1
+        _, path, counts = self._paths(np.array([[*start, *goal]], dtype=np.int64), work)
+        straight, diagonal, _ = counts[0].tolist()
+        nodes = touched[: np.argmax(np.append(touched, -1) < 0)]
+        side, which = np.nonzero(records[nodes, 2:].T != FAR)  # the kernel clears costs alone
+        nodes = nodes[which]
+        by = records[nodes, 2 + side]
+        begins, row = by == NO_ARC, graph.places[nodes] >> COLUMN_BITS + KIND_BITS
+        col = graph.places[nodes] >> KIND_BITS & (1 << COLUMN_BITS) - 1
+        cells = np.stack([row, col], axis=1).astype(np.int64) + np.array(graph.origin)
+        ends = np.array([start, goal])
+        number = np.full((2, graph.n_corners), -1)
+        number[side, nodes] = np.arange(len(nodes))
+        parents = np.where(begins, -1, number[side, np.where(begins, 0, by >> 32)])
+        first = octile_of(abs(cells - ends[side]))
+        steps = np.where(begins, first, graph.arcs[np.where(begins, 0, by & 0xFFFFFFFF), 0])
+        best = straight * STRAIGHT + diagonal * DIAGONAL if straight >= 0 else None
+        return recorded(cells, parents, steps, ends[1 - side], (best, path))
+
     def many(
         self, starts: LongArray, goals: LongArray, frame: tuple[float, ...] | None = None
     ) -> JumpPaths:
@@ -311,11 +339,12 @@ class JumpSearch:
         path_start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         return JumpPaths(length, path_start, cells, counts[:, 2])
 
-    def _paths(self, endpoints: LongArray) -> tuple[Any, Any, Any]:
+    def _paths(self, endpoints: LongArray, own: _Work | None = None) -> tuple[Any, Any, Any]:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
-        work = self._works.take()
+        work = self._works.take() if own is None else own
         found: tuple[Any, Any, Any] = kernels.paths(
             self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
         )
-        self._works.give(work)
+        if own is None:
+            self._works.give(work)
         return found
