@@ -48,10 +48,10 @@ BUDGETS = {
     "planning": (6900, 12),
     "pyramid": (4450, 9),
     "reasons": (1250, 6),
-    "refine": (6000, 9),
+    "refine": (6150, 9),
     "rooms": (5700, 9),
     "route": (1000, 6),
-    "search": (12000, 9),
+    "search": (12060, 9),
     "topology": (720, 6),
     "viz": (5330, 6),
 }

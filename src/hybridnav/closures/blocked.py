@@ -241,22 +241,24 @@ class Blocked:
         ]
 
 
-Closable = Blocked | Door | BaseGeometry | Mapping[str, Any]
-"""Types that a planner accepts as `blocked`: a `Blocked`, one door, one area, or a mapping from the
-names of the attributes of a `Blocked`."""
+Closable = Blocked | Door | OneWay | BaseGeometry | Mapping[str, Any]
+"""Types that a planner accepts as `blocked`: a `Blocked`, one door, a `OneWay`, one area, or a
+mapping from the names of the attributes of a `Blocked`."""
 
 
 def as_blocked(value: Closable) -> Blocked:
     """Convert any accepted form of closures to a `Blocked`.
 
-    `value`: a `Blocked`, one `Door`, one shapely geometry, or a mapping from the names of its
-    attributes. Raises `InvalidValueError` when the value is of another kind, has other names, or
-    invalid content.
+    `value`: a `Blocked`, one `Door`, a `OneWay`, one shapely geometry, or a mapping from the names
+    of its attributes. Raises `InvalidValueError` when the value is of another kind, has other
+    names, or invalid content.
     """
     if isinstance(value, Blocked):
         return value
     if isinstance(value, Door):
         return Blocked(doors=(value,))
+    if isinstance(value, OneWay):
+        return Blocked(one_way=value)
     if isinstance(value, BaseGeometry):
         return Blocked(polygons=(value,))
     names = tuple(one.name for one in fields(Blocked))

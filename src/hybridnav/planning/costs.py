@@ -18,6 +18,7 @@ from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.costs.factors import joined_cells
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planning import Path
+from hybridnav.refine.one_way import shorten, wrong_at
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from hybridnav.planning import PlannerSettings, Preset
     from hybridnav.refine import CostLine
     from hybridnav.search.found import Query
+
+_CHORD = 0.25
+"""Cells from one point of a curve to the next that is looked at for sides with a direction."""
 
 
 @copies_alike
@@ -168,7 +172,7 @@ class CostFinish:
     ) -> tuple[Path, float]:
         """Return the any-angle path that a path of cells is cut short to, and its cost in
         metres."""
-        points = self._line_for(closed).shorten(cells, poses[0][:2], poses[1][:2])
+        points = shorten(self._line, closed, cells, (poses[0][:2], poses[1][:2]))
         length_m = polyline_length(points)
         cost_m = max(cost_along(self._grid, self.layer, points), length_m)
         return Path(cells, points if length_m > 0 else points[:1], length_m), cost_m
@@ -177,17 +181,24 @@ class CostFinish:
         self, cells: LongArray, poses: tuple[FloatArray, FloatArray], closed: ClosedCells | None
     ) -> tuple[Path, float]:
         """Return the same path with rounded bends, and its cost in metres."""
-        line = self._line_for(closed)
-        points = line.shorten(cells, poses[0][:2], poses[1][:2])
+        points = shorten(self._line, closed, cells, (poses[0][:2], poses[1][:2]))
         return self.arcs_along(cells, points, closed)
 
     def arcs_along(
         self, cells: LongArray, points: FloatArray, closed: ClosedCells | None
     ) -> tuple[Path, float]:
         """Return an any-angle path, which passes some cells, with rounded bends, and its cost in
-        metres."""
-        found = self._line_for(closed).arcs(points, radius_m=self._turning_radius_m)
+        metres. Where arcs would cross a side the wrong way, the path keeps its bends."""
+        line = self._line_for(closed)
+        found = line.arcs(points, radius_m=self._turning_radius_m)
         path = Path(cells, found.points, found.length_m, found.headings_rad, is_curved=True)
+        if closed is not None and closed.one_way is not None and len(points) > 1:
+            curve = line.on_grain(path.poses(_CHORD * self._grid.resolution_m)[:, :2])
+            first, last = map(tuple, cells[[0, -1]].tolist())
+            if wrong_at(closed.one_way, line.free, curve, (first, last)) is not None:
+                length_m = polyline_length(points)
+                cost_m = cost_along(self._grid, self.layer, points)
+                return Path(cells, points, length_m), max(cost_m, length_m)
         return path, max(found.cost_m, found.length_m)
 
     def bound(self, query: Query, cost_m: float) -> float:

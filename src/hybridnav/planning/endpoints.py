@@ -77,7 +77,10 @@ def directed(
     if one_way is None:
         return blocked
     from hybridnav.closures.blocked import Blocked, as_blocked  # noqa: PLC0415 - loads shapely
+    from hybridnav.closures.one_way import OneWay  # noqa: PLC0415
 
+    if blocked is None and isinstance(one_way, OneWay):
+        return one_way  # by which the sides are found again
     given: Any = {} if blocked is None else blocked
     return as_blocked(given) | Blocked(one_way=one_way)
 

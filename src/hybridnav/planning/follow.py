@@ -117,7 +117,9 @@ def _followed(now: Planning, update: PlannerUpdate) -> Planning:
     if method is None:
         method = make_method(KnownMap(grid, places, costs.layer), settings)
     built = now.built if places is None else places
-    return replace(now, grid=grid, built=built, method=method, costs=costs, closures={})
+    planning = replace(now, grid=grid, built=built, method=method, costs=costs, closures={})
+    planning.closed(None)  # warns of one-way doors that are lost
+    return planning
 
 
 def opened(now: Planning, cells: list[int]) -> Planning:

@@ -10,6 +10,7 @@ import numpy as np
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planning.methods.cheapest import cells_passed
+from hybridnav.refine.one_way import obeys
 from hybridnav.search.found import Found
 
 if TYPE_CHECKING:
@@ -31,12 +32,16 @@ def staying(grid: OccupancyGrid, line: CostLine, query: Query, found: Found) -> 
     most_m = (1 + kept.within) * found.cost_m
     if kept.cells is None:
         points = line.rest_of(kept.points, query.points[0], most_m)
-        if points is None:
+        if points is None or not obeys(line, query, points):
             return found
         passed, cost_m = partial(cells_passed, query, line, points), polyline_length(points)
         return Found(passed, cost_m, min(found.lower_bound_m, cost_m), points, stats=found.stats)
-    cells = _rest_of_cells(kept.cells, query.cells[0])
-    if cells is None or not _is_legal(cells, line, corner_cutting=grid.corner_cutting):
+    cells, one_way = _rest_of_cells(kept.cells, query.cells[0]), query.one_way
+    if (
+        cells is None
+        or (one_way is not None and one_way.meets(cells))
+        or not _is_legal(cells, line, corner_cutting=grid.corner_cutting)
+    ):
         return found
     cost_m = path_length_in_cells(cells) * grid.resolution_m
     if cost_m > most_m:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid, RoomLabels
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import PlannerSettings
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.found import ClosedCells
     from hybridnav.topology import TopologicalMap
 
@@ -44,6 +45,8 @@ class _Space(NamedTuple):
     """bool (rows, cols), cells that may be entered."""
     units: IntArray | None
     """int32 (rows, cols), factors in units; None for lengths."""
+    one_way: DirectedSides | None
+    """Sides that may be crossed in one direction only; None for none."""
 
 
 def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
@@ -61,7 +64,7 @@ def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
     points have headings; `waypoints`: two or more points `(x, y)` in metres, names of rooms or of
     named points that passed `check_names`. With OMPL in a space with headings, points are
     `(x, y, yaw)`, radians. `at`: position in a room: anywhere, or at the room's point; `closed`:
-    cells that are closed for this query; `costs`: costs of the cells; None makes costs lengths.
+    what is closed for this query; `costs`: costs of the cells; None makes costs lengths.
     Result: points `(x, y)` in metres, map frame; given points are unchanged. If no path visits all
     waypoints, or a point cannot be entered, rooms are represented by their points, and so is a room
     without a cell at whose centre the robot's footprint fits with any heading. In a space with
@@ -75,7 +78,8 @@ def points_of_waypoints(  # noqa: PLR0913 - the last three have defaults
         enterable = enterable.copy()
         enterable.ravel()[closed.flat] = False
     fixed: list[Any] = [_point_of(topology, waypoint, at) for waypoint in waypoints]
-    space = _Space(topology, enterable, None if costs is None else costs.units)
+    one_way = None if closed is None else closed.one_way
+    space = _Space(topology, enterable, None if costs is None else costs.units, one_way)
     points = _chosen(space, waypoints, fixed, _radius_m(settings))
     if settings.sampling is not None and settings.sampling.has_heading:
         return _facing_along_paths(space, waypoints, points)
@@ -126,7 +130,7 @@ def _chosen(
     """Return the given points, and for rooms the points that make the path cheapest."""
     if all(point is not None for point in fixed):
         return fixed
-    topology, enterable, units = space
+    topology, enterable, units, one_way = space
     grid = topology.grid
     rooms = {
         waypoint: _where_it_fits(grid, _cells_in_room(topology, enterable, waypoint), radius_m)
@@ -145,8 +149,9 @@ def _chosen(
     ]
     found = None
     if all(map(len, sets)):
-        cutting = grid.corner_cutting
-        found = cheapest_waypoints(enterable, sets, corner_cutting=cutting, units=units)
+        found = cheapest_waypoints(
+            enterable, sets, corner_cutting=grid.corner_cutting, units=units, one_way=one_way
+        )
     if found is None:
         return [
             topology.rooms.point_of(str(waypoint)) if point is None else point
@@ -162,7 +167,7 @@ def _facing_along_paths(
     space: _Space, waypoints: Sequence[ArrayLike | str], points: list[Any]
 ) -> list[Any]:
     """Return the points, with headings along a cheapest path of cells for waypoints with names."""
-    topology, enterable, units = space
+    topology, enterable, units, one_way = space
     grid = topology.grid
     search = GridSearch(enterable, corner_cutting=grid.corner_cutting, units=units)
     cells = [_cell_at(topology, enterable, point) for point in points]
@@ -172,7 +177,7 @@ def _facing_along_paths(
         path = None
         if len(first) and len(last):
             endpoints = (divmod(int(cell[0]), grid.shape[1]) for cell in (first, last))
-            path = search.search(*endpoints).cells
+            path = search.search(*endpoints, one_way=one_way).cells
         leaving.append(math.nan if path is None else _heading(grid, path[: _steps(grid) + 1]))
         arriving.append(math.nan if path is None else _heading(grid, path[-_steps(grid) - 1 :]))
     leaving.append(math.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -13,7 +14,7 @@ import numpy as np
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike, filled
 from hybridnav._base.moves import path_length_in_cells
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planning import Path, PlanResult, PlanStatus
@@ -24,6 +25,7 @@ from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
 from hybridnav.planning.path import path_of
 from hybridnav.planning.result import PlanDraft, PlannedOn, Walk
 from hybridnav.refine import LineOfSight
+from hybridnav.refine.one_way import shorten
 from hybridnav.route.route import RouteFinder, RouteOfCells
 from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
 from hybridnav.topology.map import no_places
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
     from hybridnav.refine import CostLine
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.found import Cell, Found, Method
     from hybridnav.topology import TopologicalMap
 
@@ -209,6 +212,7 @@ class Planning:
         solid = closure.solid_on(self.grid) if is_solid else None
         one_way = closure.directions
         directed = None if one_way is None else one_way.on(self.grid, self.topology)
+        self._tell_lost(directed)
         return ClosedCells(closure.cells_on(self.grid, self.topology), solid, directed)
 
     @cached_property
@@ -219,7 +223,19 @@ class Planning:
             return None
         from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
 
-        return ClosedCells(np.empty(0, np.int64), None, directions_on(built))
+        found = directions_on(built)
+        self._tell_lost(found)
+        return ClosedCells(np.empty(0, np.int64), None, found)
+
+    def _tell_lost(self, one_way: DirectedSides | None) -> None:
+        """Warn of doors and lines that no longer lie in free space, as after an update: nobody
+        passes there, in either direction."""
+        if one_way is None:
+            return
+        able = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
+        for name in one_way.lost(able):
+            text = f"one-way {name} lies nowhere in free space, and has no effect: look at the map"
+            warnings.warn(text, MapWarning, stacklevel=2)
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
@@ -312,7 +328,9 @@ class Planning:
                 may_enter.ravel()[each.flat] = False
         if zone is None or not may_enter.ravel()[ends].all():
             return stays
-        way = way_out(may_enter, zone, int(ends[0]), corner_cutting=self.grid.corner_cutting)
+        cutting, one_way = self.grid.corner_cutting, None if closed is None else closed.one_way
+        start = int(ends[0])
+        way = way_out(may_enter, zone, start, corner_cutting=cutting, one_way=one_way)
         if way is None:
             return stays
         if closed is not None:
@@ -338,7 +356,8 @@ class Planning:
         if shut is not None:
             is_open.ravel()[shut.flat] = False
         start, goal = query.poses
-        point = nearest_reachable(self.grid, is_open, start, goal, within_m)
+        one_way = None if shut is None else shut.one_way
+        point = nearest_reachable(self.grid, is_open, query.poses, within_m, one_way)
         if point is None:
             return result
         ends = (query.points[0], np.array(point)), (start, (*point, *goal[2:]))
@@ -385,11 +404,8 @@ class Planning:
 
     def _in_sight(self, query: Query, found: Found) -> PlanResult:
         """Return the result of a path of cells that is shortened by line of sight."""
-        began, sight, closed = clock(), self._sight, query.closed
-        if closed is not None:  # one for this query
-            allowed = self.preset.planner.allow_unexplored
-            sight = LineOfSight(self.grid, allow_unexplored=allowed, closed=closed.flat)
-        points = sight.shorten(found.cells, *query.points)
+        began = clock()
+        points = shorten(self._sight, query.closed, found.cells, query.points)
         found.stats.seconds["smooth"] = clock() - began
         length_m = polyline_length(points)
         path = Path(found.cells, points if length_m > 0 else points[:1], length_m)

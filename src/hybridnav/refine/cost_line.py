@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.poses import wrapped
 from hybridnav._base.typing import AnyArray, FloatArray, LongArray
 from hybridnav.maps import OccupancyGrid
@@ -16,6 +15,7 @@ from hybridnav.maps.costs import CostLayer
 from hybridnav.refine.grid import open_cells
 from hybridnav.refine.kernels import cost_line as kernels
 from hybridnav.refine.kernels.arcs import round_bends
+from hybridnav.refine.one_way import on_grain
 
 _SPARE = 0.005
 """Most that arcs may add to the cost of a line, as a part of it."""
@@ -72,7 +72,7 @@ class CostLine:
     def __init__(
         self, grid: OccupancyGrid, layer: CostLayer, *, allow_unexplored: bool = False
     ) -> None:
-        self._frame = grid.frame
+        self.frame = grid.frame
         self._corner_cutting = grid.corner_cutting
         self.factors: AnyArray = layer.factors
         """float32 (rows, cols), >= 1."""
@@ -110,7 +110,7 @@ class CostLine:
             same. Never dearer than the line from `start` over the centres of the inner cells to
             `goal`; where corners may be cut, over those of all cells.
         """
-        position_of = self._frame.position_of
+        position_of = self.frame.position_of
         ends = np.array([position_of(*start.tolist()), position_of(*goal.tolist())])
         path = kernels.line_of_cells(_read_only(cells), ends, self._corner_cutting)
         return self.in_metres(self.settle(path), start, goal)
@@ -149,7 +149,7 @@ class CostLine:
             float64 (m, 2), `(x, y)` in metres: `start`, and the points of the line from the first
             one in its sight. None where a segment or a bend may not be driven, or it costs more.
         """
-        here, most = self.on_grain(np.array([start]))[0], most_m / self._frame.resolution_m
+        here, most = self.on_grain(np.array([start]))[0], most_m / self.frame.resolution_m
         rest = kernels.rest_of(self.free, self.factors, self.on_grain(line), here, most)
         if not len(rest) or not (self._corner_cutting or self._turns_freely(rest)):
             return None
@@ -169,12 +169,11 @@ class CostLine:
     def on_grain(self, points: FloatArray) -> FloatArray:
         """Return the positions of points, on the grain of exact tests; points on the rim of the map
         stay there."""
-        line = np.rint(self._frame.positions_of(points) * GRAIN) / GRAIN
-        return np.clip(line, 0.0, np.array(self.free.shape, dtype=np.float64))
+        return on_grain(points, self.frame, self.free.shape)
 
     def in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return the points of positions, the first and last being exact."""
-        points = self._frame.points_of_grid(line)
+        points = self.frame.points_of_grid(line)
         points[-1], points[0] = goal, start
         return points
 
@@ -200,13 +199,13 @@ class CostLine:
         if len(points) == 1:
             return ArcLine(points, np.zeros(1), 0.0, 0.0)
         line = self.on_grain(points)
-        per_cell = self._frame.resolution_m
+        per_cell = self.frame.resolution_m
         spare = _SPARE * kernels.cost_of(self.factors, line)
         found, headings, cost, length = round_bends(
             self.free, self.factors, line, radius_m / per_cell, spare
         )
-        if self._frame.yaw_rad != 0:
-            headings = wrapped(headings + self._frame.yaw_rad)
+        if self.frame.yaw_rad != 0:
+            headings = wrapped(headings + self.frame.yaw_rad)
         rounded = self.in_metres(found, points[0], points[-1])
         return ArcLine(rounded, headings, cost * per_cell, length * per_cell)
 

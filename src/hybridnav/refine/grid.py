@@ -86,11 +86,28 @@ class LineOfSight:
         allow_unexplored: bool = False,
         closed: LongArray | None = None,
     ) -> None:
-        self._frame = grid.frame
+        self.frame = grid.frame
+        self._grid, self._closed, self._allow_unexplored = grid, closed, allow_unexplored
         self._corner_cutting = grid.corner_cutting
-        self._marks = marks_of(open_cells(grid, closed, allow_unexplored=allow_unexplored))
+        self._marks = marks_of(self.free)
         self._per_metre = grid.frame.per_metre
         self._origin_m = np.array(grid.frame.origin_m)
+
+    @property
+    def free(self) -> BoolArray:
+        """bool (rows, cols), the cells that it may enter."""
+        return open_cells(self._grid, self._closed, allow_unexplored=self._allow_unexplored)
+
+    def closing(self, closed: LongArray) -> LineOfSight:
+        """Return a shortener that does not enter some other cells either.
+
+        Parameters
+        ----------
+        closed
+            int64 (n,), flat cells.
+        """
+        both = closed if self._closed is None else np.concatenate([self._closed, closed])
+        return LineOfSight(self._grid, allow_unexplored=self._allow_unexplored, closed=both)
 
     def shorten(self, cells: LongArray, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Shorten a cell path to an any-angle path between two points.
@@ -127,7 +144,7 @@ class LineOfSight:
                 f"cannot run from {tuple(metres[0].tolist())} to {tuple(metres[1].tolist())} "
                 "in metres: a point lies outside its cell"
             )
-        points = self._frame.points_of_grid(positions)
+        points = self.frame.points_of_grid(positions)
         points[0], points[-1] = metres
         return points
 

@@ -14,9 +14,11 @@ from hybridnav._base.rows import unique_rows
 from hybridnav.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Iterable, Mapping
 
     from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
+
+    Cell = tuple[int, int]
 
 
 @copies_alike
@@ -111,6 +113,23 @@ class DirectedSides:
         flat, masks = self.forbidden
         moves.ravel()[flat] = masks
         return frozen(moves)
+
+    @cached_property
+    def listed(self) -> frozenset[tuple[int, ...]]:
+        """The sides as a set of `(row_from, col_from, row_to, col_to)`: there is no way back."""
+        return frozenset(map(tuple, self.sides.tolist()))
+
+    def allows(self, cell: Cell, to: Cell, *, between: Collection[Cell]) -> bool:
+        """Return whether the way from a cell to one of its neighbours crosses no side the wrong
+        way.
+
+        `between`: the free cells at the point where it leads over. A diagonal needs another one of
+        them, from which to go on, unless there are none.
+        """
+        if abs(to[0] - cell[0]) + abs(to[1] - cell[1]) == 1:
+            return (*to, *cell) not in self.listed
+        k = _DIRECTION[to[0] - cell[0] + 1, to[1] - cell[1] + 1]
+        return len(between) == 2 and not self.moves[cell] >> k & 1  # noqa: PLR2004
 
     def meets(self, cells: LongArray) -> bool:
         """Return whether a path of cells, int64 (n, 2), makes a forbidden move."""

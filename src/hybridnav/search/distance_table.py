@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hybridnav._base.kernels.moves import legal_moves
 from hybridnav._base.moves import FAR, STRAIGHT, length_in_cells
 from hybridnav._base.threads import SHARES, cores
 from hybridnav.maps.costs import UNIT_BITS
@@ -16,7 +15,7 @@ from hybridnav.search.kernels.labels import costs_to_cells, meet
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
 
     Labels = tuple[LongArray, IntArray, LongArray]
     """Offsets of ends, corners, costs."""
@@ -124,19 +123,16 @@ def _parts(whole: slice, most: int) -> list[slice]:
 class GridLabels:
     """Least costs of cells from each start to all goals, by Dijkstra's algorithm; no labels.
 
-    `enterable`: bool (rows, cols), cells that may be entered; `units`: int32 (rows, cols), the
-    factor of each cell in units; None for 1; `corner_cutting`: see `GridSearch`.
+    `moves`: uint8 (rows, cols), the legal moves of each cell; `units`: int32 (rows, cols), the
+    factor of each cell in units; None for 1.
     """
 
     n_corners, most = 1, 16
 
-    def __init__(
-        self, enterable: BoolArray, units: IntArray | None, *, corner_cutting: bool
-    ) -> None:
-        moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
-        one = np.broadcast_to(np.int32(1 << UNIT_BITS), enterable.shape)
+    def __init__(self, moves: ByteArray, units: IntArray | None) -> None:
+        one = np.broadcast_to(np.int32(1 << UNIT_BITS), moves.shape)
         factors = np.ascontiguousarray(one if units is None else units).ravel()
-        self._grid, self._is_plain = (moves, factors, enterable.shape[1]), units is None
+        self._grid, self._is_plain = (moves.ravel(), factors, moves.shape[1]), units is None
 
     def placed(self, ends: Ends) -> LongArray:
         """Return flat cells."""

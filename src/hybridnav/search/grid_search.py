@@ -10,8 +10,9 @@ pathfinding on grid maps, 2011), without jumps: N. R. Sturtevant and S. Rabin ca
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,11 +34,12 @@ from hybridnav.search.kernels import waypoints as _waypoint_kernels
 from hybridnav.search.watched import recorded
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.watched import SearchRecord
 
 Cell = tuple[int, int]
@@ -124,6 +126,19 @@ class GridSearch:
         self._works = Pool(partial(_Work, enterable.size, self._weights))
         self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._moves))
 
+    @cached_property
+    def _directed(self) -> tuple[_Weights, Pool[_Work]]:
+        """The factors and the work arrays of searches where moves have a direction.
+
+        Records of 32 bits hold so little of a cost that a cell must be within a few moves of those
+        beside it: not so where there is no way back. Those of 64 bits hold all of it.
+        """
+        if self._weights is not None:
+            return self._weights, self._works
+        ones = np.ones((self._moves.size // self._cols, self._cols), np.int32)
+        weights = _Weights(ones, ones > 0)
+        return weights, Pool(partial(_Work, ones.size, weights))
+
     @property
     def memory_bytes(self) -> int:
         """Bytes held between searches that do not overlap."""
@@ -140,6 +155,7 @@ class GridSearch:
         in_corridor: BoolArray | None = None,
         limit: int | None = None,
         blocked: LongArray | None = None,
+        one_way: DirectedSides | None = None,
     ) -> CellPath:
         """Find a path of the least cost between the centres of two cells.
 
@@ -149,21 +165,22 @@ class GridSearch:
         `limit`: integer cost: only cheaper paths are searched; None for all. Lengths are counted in
         `STRAIGHT` and `DIAGONAL`. `blocked`: int64 (n,), flat cells of the grid that this search
         may not enter, or pass on a diagonal unless corners may be cut; the time is proportional to
-        n.
+        n. `one_way`: sides that it may cross in one direction only; not with a limit.
         """
         first = start[0] * self._cols + start[1]
         last = goal[0] * self._cols + goal[1]
         corridor = (None if field_of is None else field_of.ravel(), in_corridor)
         bound = UNLIMITED if limit is None else limit
-        if blocked is None or len(blocked) == 0:
+        none = blocked is None or len(blocked) == 0
+        if none and one_way is None:
             return self._path(self._moves, (first, last), bound, corridor)
-        if first in blocked or last in blocked:
+        shut = np.empty(0, np.int64) if blocked is None else blocked
+        if first in shut or last in shut:
             return CellPath(None, 0)
-        with self._moves_to_edit.lent() as moves:
-            touched, masks = _kernels.forbid(moves, self._cols, blocked, self._corner_cutting)
-            found = self._path(moves, (first, last), bound, corridor)
-            moves[touched] = masks
-        return found
+        limits = shut, one_way, self._corner_cutting
+        with limited(self._moves_to_edit, self._cols, limits) as moves:
+            is_directed = one_way is not None
+            return self._path(moves, (first, last), bound, corridor, is_directed=is_directed)
 
     def watch(self, start: Cell, goal: Cell) -> SearchRecord:
         """Search between two cells by lengths, and return what was reached on the way.
@@ -200,14 +217,17 @@ class GridSearch:
         endpoints: tuple[int, int],
         limit: int,
         corridor: tuple[NDArray[np.int16 | np.int32] | None, BoolArray | None],
+        *,
+        is_directed: bool = False,
     ) -> CellPath:
         """Find a path of the least cost between two flat cells; see `search`."""
-        with self._works.lent() as work:
+        weights, works = self._directed if is_directed else (self._weights, self._works)
+        with works.lent() as work:
             cost = BUCKET_FULL
             while cost == BUCKET_FULL:
                 generation = work.next_generation()
                 of_work = *corridor, work.records, generation, work.waiting
-                if self._weights is None:
+                if weights is None:
                     tables = move_tables(corner_cutting=self._corner_cutting)
                     cost, expanded = _kernels.astar(
                         moves, self._cols, endpoints, limit, *tables, *of_work
@@ -215,14 +235,14 @@ class GridSearch:
                 else:
                     cost, expanded = _kernels.weighted_astar(
                         moves,
-                        self._weights.units,
+                        weights.units,
                         self._cols,
                         endpoints,
                         limit,
-                        self._weights.scales,
-                        moves_ahead(),
+                        weights.scales,
+                        all_moves() if is_directed else moves_ahead(),
                         *of_work,
-                        self._weights.n_buckets,
+                        weights.n_buckets,
                     )
                 if cost == BUCKET_FULL:
                     work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
@@ -230,6 +250,45 @@ class GridSearch:
                 return CellPath(None, int(expanded))
             cells: LongArray = trace_cells(work.records, self._cols, *endpoints)
         return CellPath(cells, int(expanded))
+
+
+@contextmanager
+def limited(
+    pool: Pool[ByteArray], cols: int, limits: tuple[LongArray, DirectedSides | None, bool]
+) -> Iterator[ByteArray]:
+    """Lend the legal moves of a map without those of one query.
+
+    `pool`: copies of the moves, uint8 (n_cells,); `limits`: flat cells that may not be entered,
+    sides with a direction, and whether corners may be cut.
+    """
+    blocked, one_way, corner_cutting = limits
+    with pool.lent() as moves:
+        touched, masks = _kernels.forbid(moves, cols, blocked, corner_cutting)
+        if one_way is not None:
+            flat, forbidden = one_way.forbidden
+            own = moves[flat]
+            moves[flat] = own & ~forbidden
+        yield moves
+        if one_way is not None:
+            moves[flat] = own
+        moves[touched] = masks
+
+
+@lru_cache
+def all_moves() -> NDArray[np.uint32]:
+    """Return successors as `move_tables`, with all legal moves but those back.
+
+    Where a move is legal in one direction only, the paths that a successor is left out for may be
+    illegal.
+    """
+    mask = np.arange(256, dtype=np.uint32)
+    successors = np.zeros((9, 256), dtype=np.uint32)
+    for d in range(9):
+        for turn in (0, 7, 1, 6, 2, 5, 3) if d < 8 else range(8):  # noqa: PLR2004 - 8 directions
+            k = (d + turn) & 7
+            _put_first(successors[d], mask >> k & 1 == 1, k)
+    successors.flags.writeable = False
+    return successors.ravel()
 
 
 @lru_cache
@@ -320,6 +379,7 @@ def cheapest_waypoints(
     *,
     corner_cutting: bool = False,
     units: IntArray | None = None,
+    one_way: DirectedSides | None = None,
 ) -> list[int] | None:
     """Choose a cell from each set so that the path through them, in order, is cheapest.
 
@@ -329,10 +389,11 @@ def cheapest_waypoints(
     `enterable`: bool (rows, cols), cells that the path may use. Moves go to the 8 neighbours; a
     diagonal needs both side cells, unless corners may be cut. `sets`: two or more sets, int64 (n,),
     of flat enterable cells; `corner_cutting`: whether a diagonal needs no side cell; `units`: int32
-    (rows, cols), the factor of each cell in units; None makes costs lengths. Returns a flat cell of
-    each set; None if one of them cannot be reached.
+    (rows, cols), the factor of each cell in units; None makes costs lengths; `one_way`: sides that
+    may be crossed in one direction only. Returns a flat cell of each set; None if one of them
+    cannot be reached.
     """
-    moves = legal_moves(np.ascontiguousarray(enterable), corner_cutting).ravel()
+    moves = directed_moves(enterable, one_way, corner_cutting=corner_cutting).ravel()
     weights = None if units is None else np.ascontiguousarray(units).ravel()
     sources, costs = sets[0], np.zeros(len(sets[0]), dtype=np.int64)
     origins: list[LongArray] = []
@@ -351,6 +412,14 @@ def cheapest_waypoints(
     for pairs in reversed(origins):
         waypoints.append(int(pairs[np.argmax(pairs[:, 0] == waypoints[-1]), 1]))
     return waypoints[::-1]
+
+
+def directed_moves(
+    enterable: BoolArray, one_way: DirectedSides | None, *, corner_cutting: bool
+) -> ByteArray:
+    """Return the legal moves between cells, uint8 (rows, cols), by sides with a direction."""
+    moves: ByteArray = legal_moves(np.ascontiguousarray(enterable), corner_cutting)
+    return moves if one_way is None else moves & ~one_way.moves
 
 
 def costs_from(moves: ByteArray, cell: tuple[int, int], targets: LongArray) -> LongArray:

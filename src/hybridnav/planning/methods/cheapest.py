@@ -17,7 +17,9 @@ from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.geometry import cells_of_line
 from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.refine import CostLine
+from hybridnav.refine.one_way import obeys, shorten
 from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.lattice import LatticeSearch, build_lattice
 
 if TYPE_CHECKING:
@@ -64,6 +66,7 @@ class OverLattice(Method):
         self._layer = CostLayer(np.ones(self._grid.shape, np.float32)) if costs is None else costs
         allowed = self._settings.allow_unexplored
         self._line = CostLine(self._grid, self._layer, allow_unexplored=allowed)
+        self._cells: GridSearch | None = None
 
     def may_enter(self, query: Query) -> bool:
         """Return whether the cells of start and goal may be entered."""
@@ -114,7 +117,7 @@ class OverLattice(Method):
             seconds["lattice"] = clock() - began
         now = clock()
         search, line = self.prepare(), self._line
-        if query.closed is not None:
+        if query.closed is not None and len(query.closed.flat):
             search, line = self._round(query.closed)
         first, last = (
             self._position_in(cell, point)
@@ -129,14 +132,29 @@ class OverLattice(Method):
         positions = line.settle(found.positions)
         seconds["settle"] = clock() - now
         points = line.in_metres(positions, *query.points)
+        if not obeys(line, query, points):
+            cells = self._cells_of_line(query)
+            if cells is None:
+                return Found(None, stats=stats)
+            points = shorten(self._line, query.closed, cells, query.points)
         points = points if query.straight_m > 0 else points[:1]
         if query.kept is not None and len(points) > 1:
             most_m = (1 + query.kept.within) * self._cost_m(query, points)
             rest = line.rest_of(query.kept.points, query.points[0], most_m)
-            points = points if rest is None else rest
+            points = points if rest is None or not obeys(line, query, rest) else rest
         passed = partial(cells_passed, query, line, points)
         cost = partial(self._cost_m, query, points)
         return Found(passed, cost, query.straight_m, points, stats=stats)
+
+    def _cells_of_line(self, query: Query) -> LongArray | None:
+        """Return the cheapest path of cells, None for none: along it a line is led that obeys
+        directions, where that over the lattice does not."""
+        if self._cells is None:
+            free = self._line.free.view(np.bool_)
+            self._cells = GridSearch(free, units=self._layer.units)
+        closed = query.closed
+        assert closed is not None  # noqa: S101 - directions ride with what is closed
+        return self._cells.search(*query.cells, blocked=closed.flat, one_way=closed.one_way).cells
 
     def _cost_m(self, query: Query, points: FloatArray) -> float:
         """Return the cost of a line in metres, which rounding takes below no distance."""

@@ -121,7 +121,7 @@ class Discs:
             obstacles.flat[solid] = True
             flat = np.union1d(closed.flat, np.flatnonzero(self._near(obstacles)))
             self._grown.clear()
-            found = self._grown[closed] = ClosedCells(flat)
+            found = self._grown[closed] = ClosedCells(flat, one_way=closed.one_way)
         return found
 
     def _blocking(self, blocked: BoolArray) -> OccupancyGrid:

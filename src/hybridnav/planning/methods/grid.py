@@ -12,6 +12,7 @@ from hybridnav.maps import CellClass
 from hybridnav.planning.methods.own_refiner import own_refiner
 from hybridnav.refine import GridRefiner
 from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.search.grid_search import directed_moves
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import BoolArray, LongArray
@@ -62,15 +63,15 @@ def on_cells(
 
 
 def round_closed(found: Found, query: Query, refiner: GridRefiner) -> Found:
-    """Return the answer itself if it meets no closed cell, else the best path round all of them.
+    """Return the answer itself if it meets nothing closed, else the best path round all of it.
 
-    Closed cells make no path shorter, so a bound stays valid.
+    What is closed makes no path shorter, so a bound stays valid.
     """
     closed = query.closed
     if closed is None or not found.has_path or not closed.meets(found.cells, refiner.grid):
         return found
     began = clock()
-    path = refiner.search.search(*query.cells, blocked=closed.flat)
+    path = refiner.search.search(*query.cells, blocked=closed.flat, one_way=closed.one_way)
     seconds = {**found.stats.seconds, "around": clock() - began}
     expanded = found.stats.expanded + path.expanded
     if path.cells is None:
@@ -116,8 +117,11 @@ class WholeMap(Method):
         refiner = self.refiners[0]
         cells, cutting = refiner.enterable(closed), refiner.grid.corner_cutting
         units = None if refiner.costs is None else refiner.costs.units
-        found = None if cutting or units is not None else jump_labels(cells)
-        return found or GridLabels(cells, units, corner_cutting=cutting)
+        one_way = None if closed is None else closed.one_way
+        by_cells = cutting or units is not None or one_way is not None
+        found = None if by_cells else jump_labels(cells)
+        moves = directed_moves(cells, one_way, corner_cutting=cutting)
+        return found or GridLabels(moves, units)
 
     def find(self, query: Query) -> Found:
         """Find a shortest path; see `Method`."""

@@ -21,6 +21,7 @@ from hybridnav.planning.methods.discs import Discs
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import Curve, Pose, driven, shortest_curve
 from hybridnav.refine.ompl import Corridors, OmplQuery, Setup, Worker
+from hybridnav.refine.one_way import led, obeys, shorten
 from hybridnav.search.found import ClosedCells, Found, Method, Query
 
 if TYPE_CHECKING:
@@ -198,7 +199,8 @@ class OmplPlanner:
     def _sampled(self, asked: _Between, left_s: float, *, tells_search: bool) -> OmplPlan:
         """Return the answer of OMPL, or the path that is known where it finds no shorter one."""
         cells, endpoints, closed, least_m, disc, known = asked
-        flat, solid = (None, None) if closed is None else (closed.flat, closed.solid)
+        shut = led(closed, cells)
+        flat, solid = (None, None) if shut is None else (shut.flat, shut.solid)
         with self._one_at_a_time:
             self._worker.ensure()
             corridors, deadline_s = self._corridors.of(cells), time.monotonic() + left_s
@@ -212,6 +214,8 @@ class OmplPlanner:
         steps = [*known, *reply.steps]
         path = self._path(cells, reply) if len(reply.points) else None
         status = PlanStatus(reply.outcome)
+        if path is not None and not self._obeys(path, cells, endpoints, closed):
+            path, status = None, PlanStatus.TIMEOUT  # a loop through one-way doors
         is_solved = status is PlanStatus.SOLVED
         if disc is not None:
             if path is None or not is_solved or self._cost_m(path) >= self._cost_m(disc):
@@ -371,14 +375,22 @@ class OmplPlanner:
         """Return the shortened path of the grid; None if the robot cannot drive it."""
         if self.ompl.turning_radius_m is not None:
             return None
-        sight = self._sight
-        if closed is not None:
-            allowed = self._settings.allow_unexplored
-            sight = LineOfSight(self._grid, allow_unexplored=allowed, closed=closed.flat)
-        points = sight.shorten(cells, endpoints[0][:2], endpoints[1][:2])
+        points = shorten(self._sight, closed, cells, (endpoints[0][:2], endpoints[1][:2]))
         if not self.ompl.has_heading:
             return self._path_through(points, None, cells, polyline_length(points))
         return self._turning(points, cells, endpoints, closed)
+
+    def _obeys(
+        self,
+        path: Path,
+        cells: LongArray,
+        endpoints: tuple[FloatArray, FloatArray],
+        closed: ClosedCells | None,
+    ) -> bool:
+        """Return whether a path crosses no side the wrong way."""
+        if closed is None or closed.one_way is None:
+            return True
+        return obeys(self._sight, _query_of(cells, endpoints, closed), path.points)
 
     def _turning(
         self,

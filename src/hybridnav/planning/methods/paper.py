@@ -179,7 +179,8 @@ class MaxDistance(Method):
         `cut`: the answer that meets closed cells, None where costs close cells.
         """
         closed = None if query.closed is None else query.closed.flat
-        is_plain = self._is_plain and self._settings.horizon_cells > 0
+        # Windows keep costs modulo a number that is too small where there is no way back.
+        is_plain = self._is_plain and self._settings.horizon_cells > 0 and query.one_way is None
         stats, began = PlanStats() if cut is None else cut.stats, clock()
         if is_plain:
             down = descent.find(*query.cells, closed=closed)
@@ -197,6 +198,7 @@ class MaxDistance(Method):
                 field_of=corridor.field_of,
                 in_corridor=corridor.places,
                 blocked=closed,
+                one_way=query.one_way,
             )
             cells, n_cells = path.cells, corridor.n_cells
             expanded += path.expanded
@@ -213,7 +215,7 @@ class MaxDistance(Method):
         """Return the least cost of a path of cells, metres, by A* on the whole map."""
         search = self._refiner.search.search
         closed = None if query.closed is None else query.closed.flat
-        best = search(*query.cells, blocked=closed)
+        best = search(*query.cells, blocked=closed, one_way=query.one_way)
         cost = self._refiner.cost_in_cells
         costs = [cost(each) for each in (cells, best.cells) if each is not None]
         return min(costs) * self._resolution_m
