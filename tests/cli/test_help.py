@@ -26,6 +26,7 @@ COMMANDS = [
     "view",
     "map",
     "build",
+    "judge",
     "evaluate",
     "compare",
     "explore",

@@ -37,13 +37,14 @@ _HOME_OF = {
     "preset": "show",
     "evaluate": "evaluate",
     "compare": "evaluate",
+    "judge": "judge",
 }
 """The module of each command of this package; others are registered."""
 _GROUPS = {
     "Plan": ("plan", "closed", "verify"),
     "Look": ("show", "rooms", "view"),
     "Prepare": ("map", "build", "preset"),
-    "Measure": ("evaluate", "compare", "explore", "replay"),
+    "Measure": ("judge", "evaluate", "compare", "explore", "replay"),
     "Robots and fleets": ("export", "check", "serve"),
 }
 """The groups of the help; those of other packages stand in one of their own."""

@@ -256,7 +256,7 @@ def compile_model() -> None:
 
 
 def compile_harness() -> None:
-    """Compile what evaluates presets and the package's own baselines."""
+    """Compile what evaluates presets and the package's own baselines, and judges paths."""
     from hybridnav.harness import RunSettings, write_records  # noqa: PLC0415 - on demand
     from hybridnav.harness.methods import BASELINES  # noqa: PLC0415
 
@@ -266,6 +266,7 @@ def compile_harness() -> None:
         file.write_text("type octile\nheight 3\nwidth 5\nmap\n.....\n.@.@.\n...@.\n")
         settings = RunSettings(maps=(str(file),), presets=("paper",), baselines=tuple(own), pairs=9)
         write_records(settings, Path(folder) / "run")
+    hn.judge(small_grid(), [(1.0, 1.0), (4.0, 9.0)])
 
 
 def _end_with_parent() -> None:

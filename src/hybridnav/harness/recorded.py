@@ -1,16 +1,18 @@
-"""Recorded paths, held against the proved optimum between their own ends. Public: `judge`."""
+"""Recorded paths judged against the proved optimum between their own ends, and their detours."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.poses import wrapped
 from hybridnav._base.trig import directions, hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import Clearance, Contact, clearance_of, contacts_of
 from hybridnav.harness.judges.contacts import along_of
@@ -18,11 +20,6 @@ from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_points
 from hybridnav.maps.costs import cost_along
 from hybridnav.planning import HybridPlanner, PlanResult
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
 
 _LEAST_SHARE, _LEAST_M = 0.02, 0.01
 """Share of its length, and metres, that a part of a path loses at least to be listed."""
@@ -137,6 +134,19 @@ class JudgedPath:
                 ends = (tuple(places[k].tolist()) for k in (low, high))
                 found.append(Detour(float(at[low]), float(at[high]), loss_m, *ends))
         return tuple(sorted(found, key=lambda part: -part.loss_m))
+
+    def part(self, from_m: float, to_m: float) -> FloatArray:
+        """Return the points of a part of the path, float64 (k, 2).
+
+        Parameters
+        ----------
+        from_m, to_m
+            Metres along the path.
+        """
+        along = along_of(self.points)
+        inner = along[(along > from_m) & (along < to_m)]
+        at = np.concatenate([[from_m], inner, [to_m]])
+        return np.stack([np.interp(at, along, axis) for axis in self.points.T], axis=1)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values for strict JSON; infinite or missing values are None."""

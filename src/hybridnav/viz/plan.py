@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,9 @@ _LOOKS = 4
 _ROUTE_WIDTH, PATH_WIDTH, _CASING = 1.5, 2.0, 1.5
 _CUT: Any = {"colors": style.PATH, "capstyle": "round", "gid": "cut"}
 """The line of cells that part start and goal."""
+_LOSING_WIDTH = 7.0
+_LOSING: Any = {"colors": "#e6c200", "capstyle": "round", "gid": "losing"}
+"""Parts of a path that lose most, below it."""
 
 
 def plot_plan(  # noqa: PLR0913 - independent parts of a picture
@@ -285,6 +289,8 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
     path: ArrayLike,
     shortest: ArrayLike | None = None,
     *,
+    losing: Sequence[ArrayLike] = (),
+    contacts: ArrayLike | None = None,
     ax: Axes | None = None,
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
@@ -300,6 +306,10 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
         known part of the map is drawn.
     shortest
         Points of a shortest path, drawn dashed; by default there is none.
+    losing
+        Points of each part on which the path loses most, drawn wide.
+    contacts
+        Points at which it meets what it must not, shape (k, 2), drawn as crosses.
     ax
         Where to draw; by default new axes in a new figure. Leave room below for the legend.
     title
@@ -345,6 +355,15 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
         )
         canvas.ax.add_line(line)
         entries.append((line, "shortest path"))
+    parts, met = list(map(_checked, losing)), _checked([] if contacts is None else contacts)
+    if parts:
+        canvas.add_lines(parts, **_LOSING, linewidths=_LOSING_WIDTH * width, zorder=5.5)
+        wide = Line2D([], [], color=_LOSING["colors"], lw=_LOSING_WIDTH * width)
+        entries.append((wide, "loses most"))
+    if len(met):
+        look: Any = {"marker": "x", "color": style.INK, "linestyle": "", "ms": 5 * width}
+        (crosses,) = canvas.ax.plot(*met.T, **look, zorder=8, gid="contacts")
+        entries.append((crosses, "contact"))
     endpoints = next((line[[0, -1]] for line in lines if len(line)), np.empty((0, 2)))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     draw_markers(canvas, markers, lines)

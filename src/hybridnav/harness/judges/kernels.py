@@ -422,6 +422,7 @@ def faulty_spans(classes, free_of, positions, faulty):
         col_line = _first_line(col0, across, classes.shape[1])
         n_before, share, begun, tiny = len(spans), 0.0, -1.0, 0.0
         while share < 1.0:
+            # From one line to the next one of either kind.
             to_row = (row_line - row0) / up if 0 <= row_line <= classes.shape[0] else np.inf
             to_col = (col_line - col0) / across if 0 <= col_line <= classes.shape[1] else np.inf
             end = min(to_row, to_col, 1.0)
@@ -448,9 +449,11 @@ def faulty_spans(classes, free_of, positions, faulty):
                 if crossing_at(classes, free_of, at_row, at_col) != 0:
                     spans.append((float(i), end, end))
             share = end
+
+        # The last piece; without any, the segment enters a cell by less than rounding.
         if begun >= 0:
             spans.append((float(i), begun, 1.0))
-        elif len(spans) == n_before:  # it enters a cell by less than rounding
+        elif len(spans) == n_before:
             spans.append((float(i), tiny, tiny))
     found = np.empty((len(spans), 3))
     for k in range(len(spans)):

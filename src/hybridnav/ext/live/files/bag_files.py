@@ -33,6 +33,12 @@ GRID, LASER, ODOMETRY, PATH = (
         ("nav_msgs", "Path"),
     )
 )
+POSES = {
+    ODOMETRY: "pose.pose.position",
+    "geometry_msgs/msg/PoseStamped": "pose.position",
+    "geometry_msgs/msg/PoseWithCovarianceStamped": "pose.pose.position",
+}
+"""Messages with one pose, and where its position stands."""
 TRANSFORMS = frozenset({"tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"})
 
 

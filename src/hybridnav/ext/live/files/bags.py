@@ -211,19 +211,27 @@ class BagLog(ScanLog):
 
     def _transforms(self) -> bag_files.Transforms:
         """Return the transforms of the bag; what is damaged in it ends them."""
-        of_odometry = self._bag.topics_of({bag_files.ODOMETRY})
-        of_frames = self._bag.topics_of(bag_files.TRANSFORMS)
-        found, odometry = bag_files.Transforms(), bag_files.Transforms()
-        try:
-            for topic, message in self._bag.messages([*of_odometry, *of_frames]):
-                if topic in of_odometry:
-                    odometry.add_odometry(message)
-                else:
-                    found.add_message(message, is_static=topic.endswith("tf_static"))
-        except MapError:
+        found, is_whole = _transforms_of(self._bag)
+        if not is_whole:
             self.notes.append("transforms of a damaged bag")
-        found.join(odometry)
         return found
+
+
+def _transforms_of(bag: bag_files.Bag) -> tuple[bag_files.Transforms, bool]:
+    """Return the transforms of a bag, and whether it is whole: what is damaged in it ends them."""
+    of_odometry = bag.topics_of({bag_files.ODOMETRY})
+    of_frames = bag.topics_of(bag_files.TRANSFORMS)
+    found, odometry, is_whole = bag_files.Transforms(), bag_files.Transforms(), True
+    try:
+        for topic, message in bag.messages([*of_odometry, *of_frames]):
+            if topic in of_odometry:
+                odometry.add_odometry(message)
+            else:
+                found.add_message(message, is_static=topic.endswith("tf_static"))
+    except MapError:
+        is_whole = False
+    found.join(odometry)
+    return found, is_whole
 
 
 def _fixed_frame(transforms: bag_files.Transforms, frame: str) -> str:
@@ -263,6 +271,67 @@ def _ranges(message: Any) -> FloatArray:
         raise InvalidValueError("scan: ranges must be numbers") from None
     ranges[ranges < number_of(message, "range_min", "scan")] = math.nan
     return ranges
+
+
+# Recorded paths.
+
+
+def bag_paths(
+    path: PathLike, *, topic: str | None = None, frame: str | None = None
+) -> Iterator[tuple[str, FloatArray, FloatArray | None]]:
+    """Yield the recorded paths of a bag: name, points (x, y) in metres, and seconds, or None.
+
+    `topic`: of `nav_msgs/Path`, each message of which is a path, or of messages with one pose,
+    which are one path; None for the only one, paths first; `frame`: the frame that is the map's,
+    None for "map": poses in others are brought into it by transforms. Raises `MapNotFoundError`
+    when there is no such bag, `MapError` when it is damaged, has no such topic or several, or no
+    transform leads to the frame.
+    """
+    bag, wanted = bag_files.Bag(path), frame or "map"
+    of_paths = bag.topics_of({bag_files.PATH})
+    known = [topic] if topic is not None else of_paths or bag.topics_of(bag_files.POSES)
+    kind = bag.topics.get(known[0], ("", 0))[0] if len(known) == 1 else ""
+    if kind != bag_files.PATH and kind not in bag_files.POSES:
+        there = [*of_paths, *bag.topics_of(bag_files.POSES)]
+        raise MapError(
+            f"{bag.where}: topic {topic or 'of a path'!r:.80} is not one of paths or poses, or one "
+            f"of several, expected one of {', '.join(there)[:200] or 'none there'}: state --topic"
+        )
+    at = bag_files.POSES.get(kind, "pose.position")
+    transforms: bag_files.Transforms | None = None
+    rows: list[tuple[float, float, float]] = []
+    number = 0
+    for _, message in bag.messages(known):
+        poses = [message] if kind in bag_files.POSES else value_of(message, "poses", "path")
+        if kind == bag_files.PATH:
+            rows = []
+        for pose in poses:
+            x, y, z = (number_of(pose, f"{at}.{axis}", "path") for axis in "xyz")
+            stamp_ns = stamp_ns_of(pose, "path")
+            own = bag_files.frame_of(message, "header.frame_id")
+            if own != wanted:
+                transforms = transforms or _transforms_of(bag)[0]
+                try:
+                    rotation, place = transforms.pose(own, wanted, stamp_ns)
+                except bag_files.NoPoseError as why:
+                    raise MapError(
+                        f"{bag.where}: {known[0]} is in frame {own!r:.60}, expected {wanted!r:.60} "
+                        f"({why}): state --frame {own:.40} if it is the frame of the map"
+                    ) from None
+                x, y, _ = ((rotation * (x, y, z)).sum(axis=1) + place).tolist()
+            rows.append((x, y, stamp_ns / _SECOND_NS))
+        if kind == bag_files.PATH and rows:
+            number += 1
+            yield f"{known[0]} {number}", *_timed(rows)
+    if kind in bag_files.POSES and rows:
+        yield known[0], *_timed(rows)
+
+
+def _timed(rows: list[tuple[float, float, float]]) -> tuple[FloatArray, FloatArray | None]:
+    """Return points, and seconds since the first one where they differ."""
+    values = np.array(rows)
+    seconds = values[:, 2] - values[0, 2]
+    return values[:, :2], seconds if seconds.any() else None
 
 
 # Writer of bags of ROS 1 and ROS 2: maps and plans.
