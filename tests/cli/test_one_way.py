@@ -55,6 +55,14 @@ def test_a_query_goes_round_by_the_other_door(cli, map_file: Path) -> None:
     assert length_m(cli, map_file, *THERE, "--one-way", line) == 8
 
 
+@pytest.mark.parametrize("preset", ["grid-astar", "octile", "paper", "robot"])
+def test_every_preset_goes_round(cli, map_file: Path, preset: str) -> None:
+    rule = ("--one-way", "door:1=hall")
+    assert length_m(cli, map_file, *BACK, preset=preset) < LONGER_M
+    assert length_m(cli, map_file, *BACK, *rule, preset=preset) > LONGER_M
+    assert length_m(cli, map_file, *THERE, *rule, preset=preset) < LONGER_M
+
+
 def test_the_file_of_rooms_holds_for_every_query(cli, map_file: Path) -> None:
     (map_file.parent / "rooms.yaml").write_text(ROOMS + "one_way:\n- door:1=hall\n")
     assert length_m(cli, map_file, *BACK) > LONGER_M
