@@ -45,7 +45,7 @@ BUDGETS = {
     "harness": (9700, 11),
     "maps": (5420, 7),
     "models": (2180, 6),
-    "planning": (6900, 12),
+    "planning": (6950, 12),
     "pyramid": (4450, 9),
     "reasons": (1250, 6),
     "refine": (6150, 9),

@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
     from hybridnav.refine import CostLine
-    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.found import Cell, Found, Method
     from hybridnav.topology import TopologicalMap
 
@@ -212,7 +211,6 @@ class Planning:
         solid = closure.solid_on(self.grid) if is_solid else None
         one_way = closure.directions
         directed = None if one_way is None else one_way.on(self.grid, self.topology)
-        self._tell_lost(directed)
         return ClosedCells(closure.cells_on(self.grid, self.topology), solid, directed)
 
     @cached_property
@@ -224,18 +222,11 @@ class Planning:
         from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
 
         found = directions_on(built)
-        self._tell_lost(found)
-        return ClosedCells(np.empty(0, np.int64), None, found)
-
-    def _tell_lost(self, one_way: DirectedSides | None) -> None:
-        """Warn of doors and lines that no longer lie in free space, as after an update: nobody
-        passes there, in either direction."""
-        if one_way is None:
-            return
         able = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
-        for name in one_way.lost(able):
+        for name in () if found is None else found.lost(able):  # as after an update
             text = f"one-way {name} lies nowhere in free space, and has no effect: look at the map"
             warnings.warn(text, MapWarning, stacklevel=2)
+        return ClosedCells(np.empty(0, np.int64), None, found)
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return the closed cells of a query with those that the costs close for all queries."""
