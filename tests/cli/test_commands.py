@@ -502,7 +502,7 @@ def test_show_watches_a_descent(cli, tmp_path):
     assert strip.stat().st_size > 10_000
     assert cli("show", OFFICE, "--watch", "fall", moving).refuses(2, "one of growth, descent")
     refused = cli("show", OFFICE, "--watch", "descent", tmp_path / "descent.mp4")
-    assert refused.refuses(2, "--watch must end in .gif, .png")
+    assert refused.refuses(2, "--watch must end in .gif, .html, .png")
     paper = ("show", OFFICE, "--preset", "paper", "--watch", "descent")
     assert cli(*paper, tmp_path / "two.gif", "--set", "planner.step=2").code == 0
     assert n_frames(tmp_path / "two.gif") > n_frames(moving)  # a level for each halving
