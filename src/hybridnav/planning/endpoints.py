@@ -89,6 +89,8 @@ def refusal(
     closed: ClosedCells, cells: tuple[Cell, Cell], shape: tuple[int, int]
 ) -> PlanStatus | None:
     """Return the status of a query whose start or goal is closed, None if neither is."""
+    if not len(closed.flat):  # directions alone
+        return None
     shut = closed.holds(np.array(cells) @ [shape[1], 1])
     if not shut.any():
         return None

@@ -133,12 +133,12 @@ class DirectedSides:
 
     def meets(self, cells: LongArray) -> bool:
         """Return whether a path of cells, int64 (n, 2), makes a forbidden move."""
-        flat, masks = self.forbidden
-        at = cells[:-1, 0] * self.shape[1] + cells[:-1, 1]
-        place = np.minimum(np.searchsorted(flat, at), max(len(flat) - 1, 0))
-        near = np.flatnonzero(flat[place] == at) if len(flat) else place[:0]
-        rows, cols = np.diff(cells, axis=0)[near].T
-        return bool((masks[place[near]] >> _DIRECTION[rows + 1, cols + 1] & 1).any())
+        masks = self.moves[cells[:-1, 0], cells[:-1, 1]]
+        near = np.flatnonzero(masks)
+        if not len(near):
+            return False
+        rows, cols = (cells[near + 1] - cells[near]).T
+        return bool((masks[near] >> _DIRECTION[rows + 1, cols + 1] & 1).any())
 
     def lost(self, enterable: BoolArray) -> tuple[str, ...]:
         """Return the names of what has no side between two cells that may be entered."""
