@@ -70,8 +70,8 @@ class Explanation:
     entered, each beside the next one. It goes round one of the ends; beyond the map it is its rim.
     None where the ends are joined, an end is blocked, or corners may be cut."""
     against: tuple[Closure, ...] = ()
-    """Where directions alone part the ends: what leads out of all that is reached from the start,
-    or into all from which the goal is reached, but may only be crossed the other way."""
+    """Where directions alone part the ends: what may only be crossed the other way. It leads out of
+    all that is reached from the start, or into all from which the goal is reached."""
     parts_start: bool = False
     """Whether those are the ways away from the start, else the ways to the goal."""
 

@@ -46,7 +46,7 @@ class DetourSearch:
         Copies of `free` to close cells in and open them again; None to make one.
     sides
         int (n, 4), cells (row, col) from which, and to which, each side may be crossed, and not
-        back; those that are not between two open cells change nothing. None for none.
+        back. Between other than two open cells they change nothing. None for none.
 
     Examples
     --------
@@ -118,8 +118,8 @@ class DetourSearch:
         """Return whether a shortest path between open cells is illegal with these cells closed, and
         sides directed.
 
-        The result is also True if the path alone does not decide: if an end of it, or a bend, is a
-        corner of a closed cell, or if it runs along directed sides or ends at one.
+        The result is also True if the path alone does not decide: if an end or a bend of it is a
+        corner of a closed cell. The same holds if it runs along directed sides, or ends at one.
 
         Parameters
         ----------
