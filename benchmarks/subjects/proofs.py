@@ -119,7 +119,9 @@ def false_proofs(
         proof["kind"] == "line" and proof["costs"]
     ):  # the prover itself states a bound that is too high, on a longer path
         dearer = proof["cost"] + more
-        forged = hn.prove(replace(result, bound_source=proof["bound"] + more, weighted_cost=dearer))
+        forged = hn.prove(
+            replace(result, lower_bound_source=proof["bound"] + more, weighted_cost=dearer)
+        )
         yield "forged bound", {**forged, "cost": dearer}, measured
         yield "forged bound", {**forged, "cost": proof["cost"]}, measured
 

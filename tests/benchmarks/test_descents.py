@@ -33,12 +33,12 @@ def test_a_planted_fault_is_found() -> None:
     through[tuple(result.path.cells[3])] = True
     assert "closed cell" in faults(case, result, through, ends)
     assert "elsewhere" in faults(case, result, none, ends[::-1])
-    shorter = dataclasses.replace(result, bound_source=result.cost * 0.99)
+    shorter = dataclasses.replace(result, lower_bound_source=result.cost * 0.99)
     assert "bound" in faults(case, shorter, none, ends)
     cutting = Case(grid, case.open, np.full(grid.shape, 2.0))
     assert "states" in faults(cutting, result, none, ends)
     shut = hn.HybridPlanner(topology, preset="paper").plan((0.5, 0.5), (4.5, 0.5))
     assert not shut.solved
     assert "optimum" in faults(case, shut, none, ends)
-    straight = dataclasses.replace(result.path, cells=np.array([[0, 0], [0, 8]]))
+    straight = dataclasses.replace(result.path, cells_source=np.array([[0, 0], [0, 8]]))
     assert "jumps" in faults(case, dataclasses.replace(result, path=straight), none, ends)

@@ -153,7 +153,7 @@ def test_a_path_that_ends_short_of_the_goal_says_by_how_much():
         path,
         start=endpoints[0],
         goal=endpoints[1],
-        settings={"preset": "ompl"},
+        settings_source={"preset": "ompl"},
     )
     grid = hn.OccupancyGrid(np.zeros((4, 4), np.float32), hn.Frame(1.0))
     text = summary(grid, endpoints, result.to_dict())

@@ -37,6 +37,6 @@ def test_a_path_of_another_length_is_refused_and_a_false_cost_found() -> None:
     assert faults_of(planner, result) == []
     for wrong in (result.cost * 1.01, 0.0, float("nan")):
         with pytest.raises(InvalidValueError, match="a path states a length of"):
-            dataclasses.replace(result.path, length_m=wrong)
+            dataclasses.replace(result.path, points_source=result.path.points, length_m=wrong)
     assert faults_of(planner, dataclasses.replace(result, weighted_cost=result.cost * 1.1))
-    assert faults_of(planner, dataclasses.replace(result, bound_source=result.cost * 1.1))
+    assert faults_of(planner, dataclasses.replace(result, lower_bound_source=result.cost * 1.1))

@@ -274,7 +274,7 @@ def test_what_is_closed_far_from_the_path_changes_nothing(
         # The bound of `paper` is the optimum among what is open.
         assert result.lower_bound >= before.lower_bound
         assert before.cost >= result.lower_bound
-        assert answer(replace(result, bound_source=before.lower_bound)) == answer(before)
+        assert answer(replace(result, lower_bound_source=before.lower_bound)) == answer(before)
         assert result.route == before.route
 
 

@@ -53,7 +53,7 @@ def planned(points: Any, headings: Any = None, *, curved: bool = False) -> hn.Pl
     ends = tuple(points[0].tolist()), tuple(points[-1].tolist())
     record = {"preset": "shortest"}
     return hn.PlanResult(
-        hn.PlanStatus.SOLVED, "any-angle", path, settings=record, start=ends[0], goal=ends[1]
+        hn.PlanStatus.SOLVED, "any-angle", path, settings_source=record, start=ends[0], goal=ends[1]
     )
 
 

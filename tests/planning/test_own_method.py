@@ -106,7 +106,7 @@ def test_a_preset_plans_by_the_method_that_it_names(topology: hn.TopologicalMap)
     assert planner.plan(START, GOAL, smooth="line-of-sight").metric == "any-angle"
     assert planner.plan_many([START], [GOAL]).cost[0] == result.cost
     liar = planner_of(topology, "ByCells", "planner.settings.stretch=2.0")
-    for ask in (liar.plan, liar.distance, liar.draft):
+    for ask in (liar.plan, liar.distance):
         with pytest.raises(hn.errors.PresetError, match=r"find returned 5.* m for a path of 2"):
             ask(START, GOAL)
 

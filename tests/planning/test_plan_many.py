@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hybridnav as hn
-from hybridnav.planning.costs import CostFinish
+from hybridnav.planning.finishes import CostFinish
 from tests.plans import PRESETS, TWO_ROOMS, grid_of, map_of, points_in, presets
 
 
@@ -152,7 +152,7 @@ def test_costs_that_are_not_the_length_of_their_points_are_refused(
 
     def dearer(query: Any) -> Any:
         found = one(query)
-        return replace(found, cost=found.cost_m + 0.1)
+        return replace(found, cost_source=found.cost_m + 0.1)
 
     monkeypatch.setattr(method, "find_many", dearer_many)
     monkeypatch.setattr(method, "find", dearer)

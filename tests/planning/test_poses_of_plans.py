@@ -137,19 +137,18 @@ def test_a_yaw_that_is_no_number_is_refused(
 ) -> None:
     planner = hn.HybridPlanner(two_rooms, preset=preset)
     one, other = two_rooms.grid.frame.points_of([(7, 1), (1, 13)]).tolist()
-    for ask in (planner.plan, planner.draft):
-        with pytest.raises(
-            hn.errors.InvalidValueError, match=r"goal must be .* radians, got"
-        ) as caught:
-            ask(one, (*other, yaw))
-        assert "\n" not in str(caught.value)
+    with pytest.raises(
+        hn.errors.InvalidValueError, match=r"goal must be .* radians, got"
+    ) as caught:
+        planner.plan(one, (*other, yaw))
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("preset", PLAIN)
-def test_drafts_and_batches_take_yaws_too(two_rooms: hn.TopologicalMap, preset: str) -> None:
+def test_plans_and_batches_take_yaws_too(two_rooms: hn.TopologicalMap, preset: str) -> None:
     planner = hn.HybridPlanner(two_rooms, preset=preset)
     one, other = two_rooms.grid.frame.points_of([(7, 1), (1, 13)]).tolist()
-    result = planner.draft((*one, 1.0), (*other, GOAL_YAW)).result()
+    result = planner.plan((*one, 1.0), (*other, GOAL_YAW))
     assert result.path is not None
     assert result.path.poses()[[0, -1], 2].tolist() == pytest.approx([1.0, GOAL_YAW])
     batch = planner.plan_many([(*one, 1.0)], [(*other, GOAL_YAW)])

@@ -164,4 +164,4 @@ def refused_result(
         "planner": settings.planner.model_dump(),
         "pyramid": settings.pyramid.model_dump(),
     }
-    return hn.PlanResult(status, settings=record, start=start, goal=goal)
+    return hn.PlanResult(status, settings_source=record, start=start, goal=goal)

@@ -244,7 +244,7 @@ class DoorTours:
         result = self._planner.plan(whole.start, whole.goal, blocked=blocked)
         if not result.solved:
             return None
-        result = replace(result, bound_source=partial(_least_bound, whole, result.cost))
+        result = replace(result, lower_bound_source=partial(_least_bound, whole, result.cost))
         return tour_of(self._planner, [result], self._waypoints)
 
     def _candidates(self, limits: RouteLimits) -> Iterator[DoorRoute]:

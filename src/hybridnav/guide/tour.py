@@ -18,7 +18,7 @@ from hybridnav.guide.words.itinerary import guide_of, heading_of, waypoint_text
 from hybridnav.planning import Metric, PlanResult, PlanStatus
 from hybridnav.planning.named import At
 from hybridnav.planning.planner import HybridPlanner
-from hybridnav.planning.planning import Smooth
+from hybridnav.planning.settings import Smooth
 from hybridnav.search.found import ClosedCells
 
 _COUNTS = ("expanded", "expanded_places", "expanded_intervals", "corridor_cells")

@@ -1,8 +1,7 @@
-from .batch import PlanBatch as PlanBatch
+from .finishes import Refinement as Refinement
 from .path import Path as Path
 from .planner import HybridPlanner as HybridPlanner, under as under
 from .preset import (
-    LimitSettings as LimitSettings,
     Preset as Preset,
     load_preset as load_preset,
     planner_settings as planner_settings,
@@ -12,14 +11,15 @@ from .profile import PROFILES as PROFILES, Profile as Profile
 from .result import (
     COST_METRICS as COST_METRICS,
     Metric as Metric,
+    PlanBatch as PlanBatch,
     PlanResult as PlanResult,
     PlanStats as PlanStats,
     PlanStatus as PlanStatus,
-    Refinement as Refinement,
 )
 from .settings import (
     ClearanceSettings as ClearanceSettings,
     CostSettings as CostSettings,
+    LimitSettings as LimitSettings,
     PlannerSettings as PlannerSettings,
     PyramidSettings as PyramidSettings,
 )

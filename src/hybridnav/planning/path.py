@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, filled, on_demand
+from hybridnav._base.copies import copies_alike, frozen, made
 from hybridnav._base.poses import Motion
 from hybridnav.errors import InvalidValueError
 from hybridnav.messages import path_message
@@ -16,6 +16,7 @@ from hybridnav.messages import path_message
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from hybridnav._base.copies import Source
     from hybridnav._base.typing import FloatArray, LongArray, SignArray
     from hybridnav.maps import Frame
     from hybridnav.planning.speed import MotionLimits, SpeedMap, SpeedProfile
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 
 
 @copies_alike
-@on_demand("cells")
-@on_demand("points")
 @dataclass(frozen=True, eq=False)
 class Path:
     """A path through the grid, between the centres of two cells, or at any angle between two
@@ -46,13 +45,10 @@ class Path:
     13
     """
 
-    cells: LongArray
-    """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A path
-    shortened by line of sight keeps the cells of the original path."""
-    points: FloatArray
-    """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
-    where an any-angle path turns. With `is_curved` those at which lines and arcs meet: straight
-    lines between them are chords, shorter than the driven ones; `poses` lie on the arcs."""
+    cells_source: Source[LongArray] = field(repr=False)
+    """The `cells`, or how to find them."""
+    points_source: Source[FloatArray] = field(repr=False)
+    """The `points`, or how to find them."""
     length_m: float
     """Driven length in metres, on arcs along them; for a cell path it is counted as a + b sqrt 2
     cells from the moves."""
@@ -68,13 +64,23 @@ class Path:
     """Heading to which the robot turns on the spot once it is there; None for no turn."""
 
     def __post_init__(self) -> None:
-        for array in (vars(self)["cells"], vars(self)["points"]):
-            if not callable(array):
-                array.flags.writeable = False
         if self.headings_rad is not None:
-            self.headings_rad.flags.writeable = False
-        if not callable(vars(self)["points"]):
+            frozen(self.headings_rad)
+        if not callable(self.points_source):
             check_length(self.length_m, float(self._motion.lengths_m.sum()))
+
+    @cached_property
+    def cells(self) -> LongArray:
+        """int64 (n, 2), cells stood on as (row, col); consecutive ones are 8-neighbours. A path
+        shortened by line of sight keeps the cells of the original path."""
+        return frozen(made(self.cells_source))
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """float64 (m, 2), (x, y) in metres, map frame: the centres of the cells, or the few points
+        where an any-angle path turns. With `is_curved` those at which lines and arcs meet: straight
+        lines between them are chords, shorter than the driven ones; `poses` lie on the arcs."""
+        return frozen(made(self.points_source))
 
     @cached_property
     def _motion(self) -> Motion:
@@ -232,19 +238,19 @@ class Path:
 
 def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     """Return the path that a method found; cells and their centres are found when they are read."""
-    points = found.points
-    cells: Any = found.passed
-    length_m = found.cost_m if callable(found.cost) else found.cost
-    if points is None:
-        found_points = partial(_centres, found.cells if callable(cells) else cells, frame, length_m)
-    else:
-        is_one = not (is_of_cells or length_m > 0)
-        found_points = partial(_checked, points[:1] if is_one else points, length_m)
+    points, cells, cost = found.points, found.cells_source, found.cost_source
+    assert cells is not None  # noqa: S101 - the caller has looked
+    length_m = found.cost_m if callable(cost) else cost
     if callable(cells):
-        cells = partial(getattr, found, "cells")
-    else:
-        cells.flags.writeable = False
-    return filled(Path, cells=cells, points=found_points, length_m=length_m)
+        cells = partial(_cells_of, found)
+    if points is None:
+        return Path(cells, partial(_centres, cells, frame, length_m), length_m)
+    is_one = not (is_of_cells or length_m > 0)
+    return Path(cells, partial(_checked, points[:1] if is_one else points, length_m), length_m)
+
+
+def _cells_of(found: Found) -> LongArray:
+    return found.cells
 
 
 def _checked(points: FloatArray, length_m: float) -> FloatArray:
@@ -256,11 +262,11 @@ def _checked(points: FloatArray, length_m: float) -> FloatArray:
     return points
 
 
-def _centres(cells: LongArray, frame: Frame, length_m: float) -> FloatArray:
+def _centres(cells: Source[LongArray], frame: Frame, length_m: float) -> FloatArray:
     """Return the centres of the cells of a path, after a check of the length that it states."""
     from hybridnav.maps.geometry import centres, polyline_length  # noqa: PLC0415 - compiled
 
-    points = centres(cells, frame.for_kernels)
+    points = centres(frozen(made(cells)), frame.for_kernels)
     check_length(length_m, polyline_length(points))
     return points
 

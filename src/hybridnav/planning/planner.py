@@ -14,7 +14,6 @@ from hybridnav.errors import InvalidValueError, renamed
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.areas import box_of_area
 from hybridnav.planning import PlanStatus, Preset, load_preset
-from hybridnav.planning.batch import plan_many
 from hybridnav.planning.costs import PlannerCosts
 from hybridnav.planning.endpoints import directed, read_points
 from hybridnav.planning.follow import PlannerUpdate, begun, opened, update_of
@@ -23,6 +22,7 @@ from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.planning import Planning
 from hybridnav.planning.preset import check_radius
 from hybridnav.planning.questions import Questions, Unanswered
+from hybridnav.planning.result import plan_many
 from hybridnav.planning.settings import OmplPlannerSettings
 from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import no_places
@@ -41,10 +41,9 @@ if TYPE_CHECKING:
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import PlanBatch, PlanResult
     from hybridnav.planning.named import At
-    from hybridnav.planning.planning import Smooth
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.planning.profile import Profile
-    from hybridnav.planning.result import PlanDraft
+    from hybridnav.planning.settings import Smooth
     from hybridnav.search.found import ClosedCells, Method
     from hybridnav.topology.map import Version
 
@@ -110,7 +109,7 @@ class HybridPlanner(Questions):
                 f"preset {self.preset.name} plans on the places of its map, and only a grid is "
                 "given: build its topological map, or take preset shortest"
             )
-        by = PlannerCosts(grid, self.preset, costs)
+        by = PlannerCosts.of(grid, self.preset, costs)
         known = KnownMap(grid, built, by.layer, prepared)
         method, ompl = make_method(known, settings), None
         if isinstance(settings, OmplPlannerSettings):
@@ -283,7 +282,7 @@ class HybridPlanner(Questions):
                 result = now.near(query, result, within_m)
         if result.path is None or result.status is PlanStatus.NEAR_GOAL:
             ends = result.start, result.goal
-            result = replace(result, why_source=Unanswered(now, ends, closed))
+            result = replace(result, explanation_source=Unanswered(now, ends, closed))
         return result if own is None else own.stated(result, (start, goal), blocked)
 
     def _query(self) -> AbstractContextManager[bool]:
@@ -291,27 +290,6 @@ class HybridPlanner(Questions):
         if self._begun is not None:
             self._turns.alone(self._complete)
         return self._turns.shared()
-
-    def draft(
-        self,
-        start: ArrayLike | str,
-        goal: ArrayLike | str,
-        *,
-        blocked: Closable | ClosedCells | None = None,
-        one_way: OneWayLike | None = None,
-        at: At = "anywhere",
-    ) -> PlanDraft:
-        """Plan a path as `plan` does, and make its result only if it is wanted: of many plans.
-
-        Parameters
-        ----------
-        start, goal, blocked, one_way, at
-            As in `plan`.
-        """
-        with self._query():
-            closed = self._closing([start, goal], directed(blocked, one_way))
-            now = self._now
-            return now.draft(now.read(start, goal, closed, at))
 
     def plan_many(
         self,
@@ -464,7 +442,7 @@ class HybridPlanner(Questions):
 
     def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
         """Return closed cells with cells that the costs close for all queries."""
-        return self._now.closed_for_all(closed)
+        return self._now.costs.closing(closed)
 
 
 def under(planner: HybridPlanner, profile: Profile | str) -> HybridPlanner:

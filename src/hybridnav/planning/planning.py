@@ -2,53 +2,49 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike, filled
-from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.copies import copies_alike
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps.checks import checked_type
-from hybridnav.maps.geometry import polyline_length
-from hybridnav.planning import Path, PlanResult, PlanStatus
-from hybridnav.planning.batch import plan_many
-from hybridnav.planning.costs import CostFinish
+from hybridnav.planning import PlanResult
 from hybridnav.planning.endpoints import check_at, places_of_endpoints, read_ends, refusal
+from hybridnav.planning.finishes import Finished, checked_smooth, make_finish
 from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
-from hybridnav.planning.path import path_of
-from hybridnav.planning.result import PlanDraft, PlannedOn, Walk
-from hybridnav.refine import LineOfSight
-from hybridnav.refine.one_way import shorten
-from hybridnav.route.route import RouteFinder, RouteOfCells
-from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, Query
+from hybridnav.planning.result import PlannedOn, Walk, plan_many
+from hybridnav.route.route import RouteFinder, route_of_cells
+from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, PlanStatus, Query
 from hybridnav.topology.map import no_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
+    from hybridnav._base.copies import Source
     from hybridnav._base.typing import FloatArray
     from hybridnav.closures.blocked import Blocked, Closable
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning import PlanBatch, Preset
+    from hybridnav.planning import Path, PlanBatch, Preset
     from hybridnav.planning.costs import PlannerCosts
     from hybridnav.planning.endpoints import Ends
+    from hybridnav.planning.finishes import Finish
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
+    from hybridnav.planning.settings import Smooth
     from hybridnav.refine import CostLine
-    from hybridnav.search.found import Cell, Found, Method
+    from hybridnav.route.route import Route
+    from hybridnav.search.found import Cell, Method
     from hybridnav.topology import TopologicalMap
-
-Smooth = Literal["none", "line-of-sight", "arcs"]
-_SMOOTH = get_args(Smooth)
 
 _KEEPING = ("cheapest", "shortest", "octile")
 """Methods whose paths may stay on earlier ones."""
@@ -128,7 +124,7 @@ class Planning:
 
     def _shut(self, closed: ClosedCells | None, cells: tuple[Cell, Cell]) -> PlanStatus | None:
         """Return the status of a query whose start or goal is closed, None if neither is."""
-        shut = self.closed_for_all(closed)
+        shut = self.costs.closing(closed)
         return None if shut is None else refusal(shut, cells, self.grid.shape)
 
     def _kept(self, keep: PlanResult, goal: FloatArray) -> KeptLine | None:
@@ -171,7 +167,7 @@ class Planning:
         from hybridnav.planning.named import check_names, points_of_waypoints  # noqa: PLC0415
 
         check_names(self.topology, waypoints)
-        closed, costs = self.closed_for_all(self.closed(blocked)), self.costs.layer
+        closed, costs = self.costs.closing(self.closed(blocked)), self.costs.layer
         return points_of_waypoints(
             self.topology, self.preset.planner, waypoints, at=at, closed=closed, costs=costs
         )
@@ -228,34 +224,32 @@ class Planning:
             warnings.warn(text, MapWarning, stacklevel=2)
         return ClosedCells(np.empty(0, np.int64), None, found)
 
-    def closed_for_all(self, closed: ClosedCells | None) -> ClosedCells | None:
-        """Return the closed cells of a query with those that the costs close for all queries."""
-        always = self.costs.closed
-        return closed | always if closed and always else closed or always
+    @cached_property
+    def smoothing(self) -> Smooth:
+        """What is smoothed of the paths that the method finds."""
+        chosen = self.preset.planner.finish if self.smooth is None else self.smooth
+        has_arcs = self.costs.layer is not None and self.ompl is None
+        return checked_smooth(chosen, has_arcs=has_arcs)
 
     @cached_property
-    def finish(self) -> Smooth:
+    def finish(self) -> Finish:
         """What is done with the paths that the method finds."""
-        chosen = self.preset.planner.finish if self.smooth is None else self.smooth
-        if chosen not in _SMOOTH:
-            known = ", ".join(map(repr, _SMOOTH))
-            raise InvalidValueError(f"smooth must be {known}, or None, got {self.smooth!r:.80}")
-        if chosen == "arcs" and (self._by_costs is None or self.ompl is not None):
-            raise InvalidValueError(
-                "smooth 'arcs' rounds bends of paths by costs without OMPL, and this planner plans "
-                "no such paths: give it costs, or take 'line-of-sight'"
-            )
-        return chosen
+        if self.ompl is not None:
+            from hybridnav.planning.methods.ompl import Sampled  # noqa: PLC0415 - loaded by now
+
+            return Sampled(self.ompl, self.costs, self.method.metric)
+        settings, layer = self.preset.planner, self.costs.layer
+        return make_finish(self.grid, settings, layer, self.method.metric, self.smoothing)
 
     def finishing(self, smooth: Smooth | None) -> Planning:
         """Return how to plan with another finish of paths; None for that of the preset."""
-        if smooth is None or smooth == self.finish:
+        if smooth is None or smooth == self.smoothing:
             return self
         for other in self._others:
             if other.smooth == smooth:
                 return other
         other = replace(self, smooth=smooth)
-        _ = other.finish  # refuses what is none
+        _ = other.smoothing  # refuses what is none
         self._others.append(other)
         return other
 
@@ -266,7 +260,7 @@ class Planning:
     @cached_property
     def is_plain(self) -> bool:
         """Whether the cost of a plan is that of the path that the method finds."""
-        is_kept = self.finish == "none" or self.method.metric == "any-angle"
+        is_kept = self.smoothing == "none" or self.method.metric == "any-angle"
         return is_kept and self.ompl is None
 
     # Planning: a path found by the method, then refined.
@@ -274,14 +268,21 @@ class Planning:
     def plan(self, query: Query) -> PlanResult:
         """Plan a path."""
         if query.refused is not None:
-            return self._answer(query.refused, query)
+            refused = Finished("octile", None, math.inf, status=query.refused)
+            return self._answer(query, refused, PlanStats())
         found = self.method.find(query)
-        if query.kept is not None and found.has_path and self.preset.planner.method != "cheapest":
+        if found.cells_source is None:
+            how, status = None if self.ompl is None else self.ompl.no_path, PlanStatus.NO_PATH
+            metric, bound = self.method.metric, found.lower_bound_m
+            none = Finished(metric, None, bound, status=status, refinement=how)
+            return self._answer(query, none, found.stats)
+        if query.kept is not None and self.preset.planner.method != "cheapest":
             from hybridnav.planning.keeping import staying  # noqa: PLC0415 - loads the lattice
 
             line = self._open if query.closed is None else self._open.closing(query.closed.flat)
             found = staying(self.grid, line, query, found)
-        return self.result(query, found)
+        end = self.finish.finished(query, found)
+        return self._answer(query, end, found.stats, found.route_source)
 
     @cached_property
     def _open(self) -> CostLine:
@@ -342,7 +343,7 @@ class Planning:
             )
         if result.path is not None or result.status.value.startswith("start"):
             return result
-        shut = self.closed_for_all(query.closed)
+        shut = self.costs.closing(query.closed)
         is_open = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
         if shut is not None:
             is_open.ravel()[shut.flat] = False
@@ -355,176 +356,48 @@ class Planning:
         found = self.plan(self._query(ends, query.closed))
         return replace(found, status=PlanStatus.NEAR_GOAL, goal=goal)
 
-    def draft(self, query: Query) -> PlanDraft:
-        """Plan a path, and make its result only if it is wanted; see `HybridPlanner.draft`."""
-        if query.refused is not None:
-            return PlanDraft.of(self._answer(query.refused, query))
-        found = self.method.find(query)
-        made = partial(self.result, query, found)
-        if not found.has_path or self.ompl is not None or self.finish != "none":
-            return PlanDraft.of(made())
-        bound = self._bound(query, found, found.cost_m)
-        return PlanDraft(PlanStatus.SOLVED, found.cost_m, bound, found.stats, made)
-
-    def result(self, query: Query, found: Found) -> PlanResult:
-        """Refine a path that was found, and return its result."""
-        metric = self.method.metric
-        if found.passed is None:
-            bound, stats = found.lower_bound_m, found.stats
-            status, how = PlanStatus.NO_PATH, None if self.ompl is None else self.ompl.no_path
-            return self._answer(
-                status, query, metric=metric, bound_source=bound, stats=stats, refinement=how
-            )
-        if self.ompl is not None:
-            result = self._by_ompl(self.ompl, query, found)
-        elif self._by_costs is not None:
-            by_cells = metric == "weighted"
-            finished = self._cheapest if by_cells else self._rounded
-            result = finished(self._by_costs, query, found)
-        elif metric == "octile" and self.finish == "line-of-sight":
-            result = self._in_sight(query, found)
-        else:
-            path = path_of(found, self.grid.frame, is_of_cells=metric == "octile")
-            least = found.optimum or min(found.lower_bound_m, path.length_m)
-            result = self._solved(query, found, path, least, metric=metric)
-        if not self.has_rooms or result.path is None or not result.solved:
-            return result
-        assert self.built is not None  # noqa: S101 - it has rooms
-        source = Walk(self.built, query.goal_name or query.points[1], query.poses[0])
-        return replace(result, instruction_source=source)
-
-    def _in_sight(self, query: Query, found: Found) -> PlanResult:
-        """Return the result of a path of cells that is shortened by line of sight."""
-        began = clock()
-        points = shorten(self._sight, query.closed, found.cells, query.points)
-        found.stats.seconds["smooth"] = clock() - began
-        length_m = polyline_length(points)
-        path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
-        return self._solved(query, found, path, query.straight_m, metric="any-angle")
-
-    @cached_property
-    def _sight(self) -> LineOfSight:
-        return LineOfSight(self.grid, allow_unexplored=self.preset.planner.allow_unexplored)
-
-    @cached_property
-    def _by_costs(self) -> CostFinish | None:
-        """The last step of plans by costs; None for plans by lengths."""
-        layer = self.costs.layer
-        return None if layer is None else CostFinish(self.grid, layer, self.preset.planner)
-
-    def _cheapest(self, costs: CostFinish, query: Query, found: Found) -> PlanResult:
-        """Return the result of a cheapest path of cells."""
-        solved = partial(self._solved, query, found)
-        if self.finish == "none":
-            points = self.grid.frame.points_of(found.cells)
-            length_m = path_length_in_cells(found.cells) * self.grid.resolution_m
-            path, cost_m = Path(found.cells, points, length_m), found.cost_m
-            least = found.optimum or found.lower_bound_m
-            return solved(path, least, metric="weighted", weighted_cost=cost_m)
-        began = clock()
-        finish = costs.arcs if self.finish == "arcs" else costs.line
-        path, cost_m = finish(found.cells, query.points, query.closed)
-        found.stats.seconds["smooth"] = clock() - began
-        bound, of_cells = self._cost_bound(query, cost_m), found.lower_bound_m
-        metric: Any = "any-angle-weighted"
-        return solved(path, bound, metric=metric, weighted_cost=cost_m, grid_bound=of_cells)
-
-    def _rounded(self, costs: CostFinish, query: Query, found: Found) -> PlanResult:
-        """Return the result of a cheapest any-angle path, with arcs if the request says so."""
-        points = found.points
-        assert points is not None  # noqa: S101 - any-angle methods state them
-        if self.finish == "arcs":
-            began = clock()
-            path, cost_m = costs.arcs_along(found.cells, points, query.closed)
-            found.stats.seconds["arcs"] = clock() - began
-        else:
-            length_m, cost_m = polyline_length(points), found.cost_m
-            path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
-        bound = self._cost_bound(query, cost_m)
-        metric, weighted = self.method.metric, cost_m
-        return self._solved(
-            query, found, path, bound, metric=metric, weighted_cost=weighted, line=points
-        )
-
-    def _bound(self, query: Query, found: Found, cost_m: float) -> float | Callable[[], float]:
-        """Return the bound of a path, or how to find it where it takes a search of its own."""
-        if self.method.metric == "any-angle-weighted":
-            return self._cost_bound(query, cost_m)
-        return found.optimum or min(found.lower_bound_m, cost_m)
-
-    def _cost_bound(self, query: Query, cost_m: float) -> Callable[[], float]:
-        """Return how to find a bound on the cost of all any-angle paths, when somebody reads it."""
-        costs = self._by_costs
-        assert costs is not None  # noqa: S101 - the plan is by costs
-        return partial(costs.bound, query, cost_m)
-
-    def _by_ompl(self, ompl: OmplPlanner, query: Query, found: Found) -> PlanResult:
-        """Return the result of a path refined by OMPL, with the bound of the method too."""
-        now = clock()
-        first, last = (np.array([*pose, 0.0][:3]) for pose in query.poses)
-        is_any_angle = self.method.metric == "any-angle"
-        refined = ompl.plan(
-            found.cells,
-            (first, last),
-            self.closed_for_all(query.closed),
-            spent_s=now - query.began,
-            least_m=found.lower_bound_m if is_any_angle else query.straight_m,
-            along=found,
-        )
-        found.stats.seconds["ompl"] = clock() - now
-        bound, path = refined.lower_bound, refined.path
-        if path is not None and refined.status is PlanStatus.SOLVED:
-            path = path if path.headings_rad is not None else path.turned_at_ends(*query.poses)
-        return self._answer(
-            refined.status,
-            query,
-            metric=refined.metric,
-            path=path,
-            route_source=self._route_of(path),
-            bound_source=bound,
-            weighted_cost=refined.weighted_cost,
-            refinement=refined.refinement,
-            stats=found.stats,
-        )
-
     # Results: with their routes, and the settings that they were planned by.
 
-    def _solved(
+    def _answer(
         self,
         query: Query,
-        found: Found,
-        path: Path,
-        bound: float | Callable[[], float],
-        **outcome: Any,
+        end: Finished,
+        stats: PlanStats,
+        route: Source[Route | None] = None,
     ) -> PlanResult:
-        """Return the result of a path, whose bound is at most its cost."""
-        cost_m, ends = outcome.get("weighted_cost", path.length_m), query.poses
-        turns = len(ends[0]) + len(ends[1]) > 4  # noqa: PLR2004 - numbers of two points
-        return self._answer(
-            PlanStatus.SOLVED,
-            query,
-            path=path.turned_at_ends(*ends) if turns else path,
-            route_source=found.route or self._route_of(path),
-            bound_source=bound if callable(bound) else min(bound, cost_m),
-            stats=found.stats,
-            **outcome,
-        )
-
-    def _answer(self, status: PlanStatus, query: Query, **outcome: Any) -> PlanResult:
-        """Return a result that records endpoints, preset and settings of the pyramid."""
+        """Return a result, which records endpoints, preset and settings of the pyramid."""
+        metric, path, bound, cost, grid_bound, line, status, how = end
         start, goal = query.poses
-        made: Any = {"stats": PlanStats()} if "stats" not in outcome else {}
-        on = PlannedOn(self.grid, self.costs, query.closed, self.topology)
-        made |= {"ground": on, "status": status}
-        made |= {"start": start, "goal": goal}
-        return filled(PlanResult, settings=partial(deepcopy, self._settings), **made, **outcome)
-
-    def _route_of(self, path: Path | None) -> RouteOfCells | None:
-        """Return what the route of a path is found from, None for no path or no places."""
-        if path is None or self.built is None or self._route_finder is None:
-            return None
-        cells = partial(getattr, path, "cells")
-        return filled(RouteOfCells, topology=self.built, finder=self._route_finder, cells=cells)
+        words: Source[tuple[Any, ...]] = ()
+        if path is not None:
+            if self.ompl is None and len(start) + len(goal) > 4:  # noqa: PLR2004 - two points
+                path = path.turned_at_ends(start, goal)
+            built, finder = self.built, self._route_finder
+            is_derived = route is None or self.ompl is not None
+            if is_derived and built is not None and finder is not None:
+                route = partial(_route_along, built, finder, path)
+            if status is PlanStatus.SOLVED:
+                if not callable(bound):
+                    bound = min(bound, path.length_m if cost is None else cost)
+                if built is not None and self.has_rooms:
+                    words = Walk(path, built, query.goal_name or query.points[1], start)
+        return PlanResult(
+            status=status,
+            metric=metric,
+            path=path,
+            route_source=route,
+            lower_bound_source=bound,
+            stats=stats,
+            settings_source=partial(deepcopy, self._settings),
+            weighted_cost=cost,
+            refinement=how,
+            start=start,
+            goal=goal,
+            grid_bound=grid_bound,
+            line=line,
+            instructions_source=words,
+            ground=PlannedOn(self.grid, self.costs, query.closed, self.topology),
+        )
 
     @cached_property
     def _route_finder(self) -> RouteFinder | None:
@@ -552,8 +425,6 @@ class Planning:
         """Whether the map has rooms, so that words tell of its paths."""
         return self.topology is not None and self.topology.has_rooms
 
-    # Many queries at once: those that look-ups answer in one kernel, the others one by one.
-
     def plan_many(
         self,
         pairs: tuple[FloatArray, FloatArray],
@@ -567,3 +438,7 @@ class Planning:
             return now.plan(now.read(start, goal, closed))
 
         return plan_many(now.grid, now.method if now.is_plain else None, pairs, closed, alone)
+
+
+def _route_along(topology: TopologicalMap, finder: RouteFinder, path: Path) -> Route:
+    return route_of_cells(topology, finder, path.cells)

@@ -1,5 +1,5 @@
 """Presets: how to build a pyramid and how to plan on it, in YAML files that are checked. Public:
-`LimitSettings` and `planner_settings`.
+`planner_settings`.
 """
 
 from __future__ import annotations
@@ -7,10 +7,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import yaml
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import ValidationError
 
 from hybridnav._base.files import printable
 from hybridnav._base.yaml_file import parse_value, read_yaml
@@ -19,12 +19,12 @@ from hybridnav.planning.settings import (
     METHODS,
     SECTIONS,
     AnyMethod,
+    LimitSettings,
     PaperSettings,
     PlannerSettings,
     PyramidSettings,
     Section,
     method_of,
-    no_boolean,
 )
 
 if TYPE_CHECKING:
@@ -36,32 +36,6 @@ if TYPE_CHECKING:
 _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")
 """Folders of presets: inside an installed package, or beside `src` in a checkout."""
-
-
-_Limit = Annotated[float, BeforeValidator(no_boolean), Field(gt=0, allow_inf_nan=False)]
-
-
-class LimitSettings(Section):
-    """Section `limits`: how fast the robot drives, see `MotionLimits`; `duration_s` needs them.
-
-    Examples
-    --------
-    >>> hn.load_preset("robot", overrides=["limits.max_speed_m_s=0.26"]).limits.max_speed_m_s
-    0.26
-    """
-
-    max_speed_m_s: _Limit = 0.5
-    """Speed ahead and backwards, m / s."""
-    max_acceleration_m_s2: _Limit = 2.5
-    """Gain of speed, m / s^2."""
-    max_deceleration_m_s2: _Limit = 2.5
-    """Loss of speed when braking, m / s^2."""
-    max_lateral_acceleration_m_s2: _Limit = 1.0
-    """Speed^2 * curvature on arcs, m / s^2."""
-    max_turning_rate_rad_s: _Limit = 2.0
-    """Turn of the heading, rad / s."""
-    max_angular_acceleration_rad_s2: _Limit = 3.2
-    """Change of the turning rate in turns on the spot, rad / s^2."""
 
 
 class Preset(Section):

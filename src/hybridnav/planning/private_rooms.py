@@ -14,6 +14,8 @@ from hybridnav.closures.blocked import Blocked
 from hybridnav.maps import NO_ROOM, CellClass
 from hybridnav.maps.clearance import within_radius
 from hybridnav.planning.profile import ProfiledFloor, forbidden, in_the_way
+from hybridnav.route import RouteFinder
+from hybridnav.route.visits import visits_of
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
@@ -246,20 +248,18 @@ class Privacy:
         def passed(other: Profile) -> list[str] | None:
             """Return what a path under another profile passes."""
             planner = self._whole.profiled(other)
-            path = planner.draft(*ends, blocked=blocked).result().path
-            # Loads modules that plans without a profile do not need.
-            from hybridnav.guide.words.itinerary import guide_of  # noqa: PLC0415
-
-            guide = guide_of(planner)
-            if path is None or guide is None:
+            path = planner.path_between(*ends, blocked)
+            if path is None or planner.pyramid_rooms is None:
                 return None
-            rooms = planner.topology.rooms.labels
-            return in_the_way(self.profile, rooms, guide.doors(path), path)
+            rooms = planner.topology.rooms
+            visits = visits_of(rooms, RouteFinder(rooms), path.cells, path.length_m)
+            doors = [each.door for each in visits if each.door is not None]
+            return in_the_way(self.profile, rooms.labels, doors, path)
 
         facts = {"name": self.profile.name, "asks": self.profile.described}
         if not result.solved and not isinstance(blocked, ClosedCells):
             facts["forbids"] = forbidden(self.profile, passed)
-        return replace(result, settings=result.settings | {"profile": facts})
+        return replace(result, settings_source=result.settings | {"profile": facts})
 
     def joined(
         self,

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridnav.closures.blocked import Closable
     from hybridnav.closures.one_way import OneWayLike
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import HybridPlanner, PlanBatch
+    from hybridnav.planning import HybridPlanner, Path, PlanBatch
     from hybridnav.planning.planning import Planning
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.reasons import Explanation
@@ -102,6 +102,14 @@ class Questions:
             if self._privacy is not None:
                 closed = self._closing([start, goal], closed)
             return _distance(now, now.read(start, goal, closed))
+
+    def path_between(
+        self, start: ArrayLike | str, goal: ArrayLike | str, blocked: Closable | ClosedCells | None
+    ) -> Path | None:
+        """Return the path of a plan, and no word of why there is none."""
+        with self._query():
+            now, closed = self._now, self._closing([start, goal], blocked)
+            return now.plan(now.read(start, goal, closed)).path
 
     def asked(
         self,
@@ -243,7 +251,7 @@ def _usable(
     inside = ((cells >= 0) & (cells < able.shape)).all(axis=1)
     good: BoolArray = np.zeros(len(cells), np.bool_)
     good[inside] = able[tuple(cells[inside].T)]
-    shut = now.closed_for_all(closed)
+    shut = now.costs.closing(closed)
     if shut is not None:
         good[good] &= ~shut.holds(cells[good] @ np.array([able.shape[1], 1]))
     return points[good], np.flatnonzero(good)

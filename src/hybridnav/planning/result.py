@@ -1,5 +1,5 @@
-"""Results of a planner: statuses, routes, bounds. Public: `COST_METRICS`, `Refinement` and
-`Metric`.
+"""Results of a planner, of one query and of a batch: statuses, routes, bounds. Public:
+`COST_METRICS` and `Metric`.
 """
 
 from __future__ import annotations
@@ -7,16 +7,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybridnav._base.copies import on_demand
+from hybridnav._base.copies import copies_alike, frozen, made, made_state
 from hybridnav._base.extension import in_html
 from hybridnav._base.trig import dist
 from hybridnav.errors import PlanError, renamed
+from hybridnav.maps import CellClass
+from hybridnav.planning.path import check_length, is_length
 from hybridnav.planning.text import rounded_bound
-from hybridnav.route.route import Route
+from hybridnav.search.found import ClosedCells, QueryMany
 from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
 from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
 from hybridnav.search.found import PlanStatus as PlanStatus  # noqa: PLC0414
@@ -27,27 +29,21 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
     from typing_extensions import Self
 
-    from hybridnav._base.typing import FloatArray
+    from hybridnav._base.copies import Source
+    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.guide.words import Instruction
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning.costs import PlannerCosts
+    from hybridnav.planning.finishes import Refinement
     from hybridnav.planning.path import Path
     from hybridnav.planning.speed import MotionLimits
     from hybridnav.reasons import Explanation
-    from hybridnav.search.found import ClosedCells
+    from hybridnav.route.route import Route
+    from hybridnav.search.found import FoundMany, Method
     from hybridnav.topology import TopologicalMap
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})
 """Metrics of plans by a `CostLayer`: costs are metres, each counted by the factors along it."""
-
-
-class RouteSource(Protocol):
-    """Data from which a route is found when somebody reads it: naming it takes longer than to plan
-    some paths."""
-
-    def route(self) -> Route:
-        """Find the route."""
-        ...
 
 
 class PlannedOn(NamedTuple):
@@ -63,9 +59,11 @@ class PlannedOn(NamedTuple):
     """The places of the map; None while they are not built."""
 
 
-class Walk(NamedTuple):
-    """What the instructions of a path are found from, beside the path."""
+@dataclass(frozen=True)
+class Walk:
+    """What the instructions of a path are found from, when somebody reads them."""
 
+    path: Path
     topology: TopologicalMap
     """The map with its rooms."""
     goal: ArrayLike | str
@@ -73,32 +71,13 @@ class Walk(NamedTuple):
     start: Sequence[float]
     """`(x, y)`, or `(x, y, yaw)` of a robot with a heading."""
 
+    def __call__(self) -> tuple[Instruction, ...]:
+        """Find the instructions."""
+        from hybridnav.guide.words.itinerary import instructions_of  # noqa: PLC0415 - with rooms
 
-Answer = Literal["circumscribed disc", "inscribed disc", "OMPL", "grid"]
-
-
-@dataclass(frozen=True)
-class Refinement:
-    """History of the path of a sampling-based planner."""
-
-    steps: tuple[str, ...]
-    """Attempts in order, with outcomes: `corridor: timeout`, `widened corridor: solved`."""
-    by: Answer
-    """The source of the answer. The path of the `circumscribed disc` is valid with every heading.
-    The `inscribed disc` proves that there is no path, or the robot can drive its cheapest one.
-    `OMPL` sampled it. The path of the `grid`, pulled taut, counts where all else failed."""
-    trace: tuple[tuple[float, float], ...] = ()
-    """Seconds and cost of each better path."""
-    iterations: int = 0
-    """Iterations of planners and simplification."""
-
-    @property
-    def by_grid(self) -> bool:
-        """Whether the path is the grid's, shortened by line of sight."""
-        return self.by == "grid"
+        return instructions_of(self.path, self.topology, self.goal, self.start)
 
 
-@on_demand("settings")
 @dataclass(frozen=True, eq=False)
 class PlanResult:
     """Outcome of one query; `path` and `route` are None unless it is solved.
@@ -116,13 +95,13 @@ class PlanResult:
     status: PlanStatus
     metric: Metric = "octile"
     path: Path | None = None
-    route_source: RouteSource | Route | None = field(default=None, repr=False)
-    """The route, or the data to find it from; nothing of the planner."""
-    bound_source: float | Callable[[], float] = field(default=math.inf, repr=False)
+    route_source: Source[Route | None] = field(default=None, repr=False)
+    """The route, or how to find it; nothing of the planner."""
+    lower_bound_source: Source[float] = field(default=math.inf, repr=False)
     """The lower bound, or how to find it."""
     stats: PlanStats = field(default_factory=PlanStats)
-    settings: dict[str, Any] = field(default_factory=dict)
-    """Preset, and settings of the planner and the pyramid; its `limits`, if it has any."""
+    settings_source: Source[dict[str, Any]] = field(default_factory=dict, repr=False)
+    """The settings, or how to state them."""
     weighted_cost: float | None = None
     """Cost in a metric other than the length, as with costs of cells; None for the length."""
     refinement: Refinement | None = None
@@ -137,9 +116,9 @@ class PlanResult:
     line: FloatArray | None = field(default=None, repr=False)
     """float64 (m, 2), the straight lines of a path by method `cheapest` before its bends were
     rounded, `(x, y)` in metres, map frame; None of other paths."""
-    instruction_source: Walk | tuple[Instruction, ...] = field(default=(), repr=False)
-    """The instructions, or the data to find them from."""
-    why_source: Callable[[], Explanation] | Explanation | None = field(default=None, repr=False)
+    instructions_source: Source[tuple[Instruction, ...]] = field(default=(), repr=False)
+    """The instructions, or how to find them."""
+    explanation_source: Source[Explanation | None] = field(default=None, repr=False)
     """The explanation, or how to find it."""
     leaves_m: float | None = None
     """Metres from the start out of closed cells, which `leave_zone` opened; None of others."""
@@ -181,15 +160,18 @@ class PlanResult:
         That of an any-angle path by costs is found when it is read first, in tens of milliseconds
         on maps of buildings: see `search.lattice.cost_bound`.
         """
-        source = self.bound_source
-        return source() if callable(source) else source
+        return made(self.lower_bound_source)
 
     @cached_property
     def route(self) -> Route | None:
         """The places and arcs of the path: chosen before it (`paper`), or derived from it (all
         other presets); None unless there is a path."""
-        source = self.route_source
-        return source if source is None or isinstance(source, Route) else source.route()
+        return made(self.route_source)
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """Preset, and settings of the planner and the pyramid; its `limits`, if it has any."""
+        return made(self.settings_source)
 
     @property
     def limits(self) -> MotionLimits | None:
@@ -214,21 +196,13 @@ class PlanResult:
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
         """Instructions for a person; none without a path, and on a map without rooms."""
-        source = self.instruction_source
-        if not isinstance(source, Walk):
-            return source
-        if self.path is None:
-            return ()
-        from hybridnav.guide.words.itinerary import instructions_of  # noqa: PLC0415 - with rooms
-
-        return instructions_of(self.path, *source)
+        return made(self.instructions_source)
 
     @cached_property
     def explanation(self) -> Explanation | None:
         """Why there is no path, found when it is read first, in about a second on a million cells;
         None with a path, and in batches."""
-        source = self.why_source
-        return source() if callable(source) else source
+        return made(self.explanation_source)
 
     @property
     def reason(self) -> str:
@@ -243,17 +217,8 @@ class PlanResult:
         return words(self, language)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with what is found on demand, so that copies hold no map."""
-        found = {"route", "instructions", "lower_bound", "duration_s", "explanation"}
-        state = {name: value for name, value in vars(self).items() if name not in found}
-        return state | {
-            "route_source": self.route,
-            "instruction_source": self.instructions,
-            "bound_source": self.lower_bound,
-            "settings": self.settings,
-            "why_source": self.explanation,
-            "ground": None,
-        }
+        """Return the state with all values made, so that copies hold no map."""
+        return made_state(self) | {"ground": None}
 
     @property
     def solved(self) -> bool:
@@ -353,36 +318,194 @@ class PlanResult:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class PlanDraft:
-    """A plan between two waypoints, for those who compare many and want the result of few."""
-
-    status: PlanStatus
-    cost: float
-    """As in `PlanResult`."""
-    bound_source: float | Callable[[], float]
-    """The lower bound, or how to find it."""
-    stats: PlanStats
-    result: Callable[[], PlanResult]
-    """Makes the result."""
-
-    @classmethod
-    def of(cls, result: PlanResult) -> Self:
-        """Return the draft of a result that is made already."""
-        bound = partial(getattr, result, "lower_bound")
-        return cls(result.status, result.cost, bound, result.stats, lambda: result)
-
-    @property
-    def lower_bound(self) -> float:
-        """As in `PlanResult`."""
-        return self.bound_source() if callable(self.bound_source) else self.bound_source
-
-    def __reduce__(self) -> tuple[Callable[[PlanResult], PlanDraft], tuple[PlanResult]]:
-        """Make the result, with which copies travel without the planner and its map."""
-        return PlanDraft.of, (self.result(),)
-
-
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+# Many queries at once: those that look-ups answer in one kernel, the others one by one.
+
+
+@copies_alike
+@dataclass(frozen=True, eq=False)
+class PlanBatch:
+    """Outcomes of many queries, arrays of n.
+
+    Examples
+    --------
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> planner = hn.HybridPlanner(topology)
+    >>> batch = planner.plan_many([(0.5, 0.5), (0.5, 0.5)], [(2.0, 2.5), (1.5, 0.5)])
+    >>> batch.cost.round(3)
+    array([2.546, 1.   ])
+    """
+
+    status: AnyArray
+    """str (n,), the values of `PlanStatus`."""
+    cost: FloatArray
+    """float64 (n,), metres; infinite where there is no path."""
+    lower_bound_source: Source[FloatArray]
+    """The lower bounds, or how to find them."""
+    path_start: LongArray
+    """int64 (n + 1,), query i has the points `path_start[i]` to `path_start[i + 1]`."""
+    points: FloatArray
+    """float64 (m, 2), (x, y) in metres, map frame, of all paths."""
+    headings_rad: FloatArray | None = None
+    """float64 (m,), the heading at each point; None in spaces without headings."""
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in (self.status, self.cost, self.path_start, self.points):
+            frozen(array)
+        if self.headings_rad is not None:
+            frozen(self.headings_rad)
+
+    @cached_property
+    def lower_bound(self) -> FloatArray:
+        """float64 (n,), metres, as in `PlanResult`; those of any-angle paths by costs are found
+        when they are read first, in tens of milliseconds each on maps of buildings."""
+        return frozen(made(self.lower_bound_source))
+
+    @property
+    def gap(self) -> FloatArray:
+        """float64 (n,), proved distances from the optimum; NaN where there is no path."""
+        gap = np.full(len(self.cost), np.nan)
+        solved = np.isfinite(self.cost)
+        np.divide(self.cost, self.lower_bound, out=gap, where=solved & (self.lower_bound > 0))
+        gap[solved & (self.lower_bound <= 0)] = 1.0
+        return gap - 1
+
+    def path(self, query: int) -> FloatArray:
+        """Return the points of one path, float64 (k, 2); none where there is no path."""
+        return self.points[self.path_start[query] : self.path_start[query + 1]]
+
+
+def plan_many(
+    grid: OccupancyGrid,
+    at_once: Method | None,
+    endpoints: tuple[FloatArray, FloatArray],
+    closed: ClosedCells | None,
+    alone: Callable[[FloatArray, FloatArray], PlanResult],
+) -> PlanBatch:
+    """Return the answers to pairs of points, in arrays.
+
+    `at_once`: planner for many queries at once; None leaves all to `alone`; `endpoints`: starts and
+    goals, float64 (n, 2) each, or poses (n, 3); `closed`: closed cells; None for none; `alone`:
+    plans one of the remaining queries, between two of the `endpoints`.
+    """
+    starts, goals = endpoints
+    n = len(starts)
+    status = np.full(n, str(PlanStatus.SOLVED), dtype=f"U{max(map(len, PlanStatus))}")
+    cost, bound = np.full(n, np.inf), np.full(n, np.inf)
+    counts, source = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    paths: dict[int, FloatArray] = {}
+    headings = [np.empty(0)]
+    late: dict[int, Callable[[], float]] = {}
+    left = np.ones(n, dtype=np.bool_)
+    first, last = grid.frame.cells_of(starts[:, :2]), grid.frame.cells_of(goals[:, :2])
+    asked = np.flatnonzero(_are_free(grid, first) & _are_free(grid, last))
+    found = None
+    if len(asked) and at_once is not None:
+        cells = first[asked], last[asked]
+        found = at_once.find_many(QueryMany(cells, (starts[asked], goals[asked]), closed))
+    if at_once is not None and found is not None:
+        kept = found.is_done
+        _check_lengths(found, at_once.metric)
+        if closed is not None:
+            on_cells = found if at_once.metric == "octile" else None
+            kept = kept & ~_met(closed, cells, grid, on_cells)
+        done = asked[kept]
+        left[done] = False
+        cost[done] = found.cost_m[kept]
+        bound[done] = np.minimum(found.lower_bound_m[kept], cost[done])
+        status[done[np.isinf(cost[done])]] = str(PlanStatus.NO_PATH)
+        source[done] = found.path_start[:-1][kept]
+        counts[done] = np.diff(found.path_start)[kept]
+        still = done[~(cost[done] > 0)]
+        counts[still] = np.minimum(counts[still], 1)
+    for i in np.flatnonzero(left).tolist():
+        result = alone(starts[i], goals[i])
+        status[i], cost[i] = str(result.status), result.cost
+        if callable(result.lower_bound_source):
+            late[i] = result.lower_bound_source
+        else:
+            bound[i] = result.lower_bound_source
+        if result.path is not None:
+            paths[i] = result.path.points
+            counts[i] = len(paths[i])
+            if result.path.headings_rad is not None:
+                headings.append(result.path.headings_rad)
+    path_start = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    is_whole = found is not None and not left.any() and path_start[-1] == len(found.points)
+    points = found.points if found is not None and is_whole else np.empty((path_start[-1], 2))
+    if found is not None and not is_whole:
+        counts[left] = 0
+        points[_rows(path_start[:-1], counts)] = found.points[_rows(source, counts)]
+    for i, path in paths.items():
+        points[path_start[i] : path_start[i + 1]] = path
+    has_yaw = starts.shape[1] > 2  # noqa: PLR2004
+    return PlanBatch(
+        status=status,
+        cost=cost,
+        lower_bound_source=partial(_with_late, bound, late) if late else bound,
+        path_start=path_start,
+        points=points,
+        headings_rad=np.concatenate(headings) if has_yaw else None,
+    )
+
+
+def _check_lengths(found: FoundMany, metric: str) -> None:
+    """Refuse paths whose costs are not the lengths of their points, by metrics of lengths."""
+    if metric not in {"octile", "any-angle"}:
+        return
+    from hybridnav.maps.geometry import polyline_lengths  # noqa: PLC0415 - compiled
+
+    driven_m = polyline_lengths(found.points, found.path_start)
+    goes = found.is_done & np.isfinite(found.cost_m)
+    stated_m, driven_m = found.cost_m[goes], driven_m[goes]
+    for wrong in np.flatnonzero(~is_length(stated_m, driven_m))[:1]:
+        check_length(stated_m[wrong], driven_m[wrong])
+
+
+def _rows(begin: LongArray, counts: LongArray) -> LongArray:
+    """Return the rows of runs that begin somewhere, one run after the other."""
+    before = np.cumsum(counts) - counts
+    return np.repeat(begin - before, counts) + np.arange(counts.sum())
+
+
+def _with_late(bound: FloatArray, late: dict[int, Callable[[], float]]) -> FloatArray:
+    """Return bounds with those that are found only now."""
+    bound = bound.copy()
+    for i, source in late.items():
+        bound[i] = source()
+    return bound
+
+
+def _met(
+    closed: ClosedCells,
+    endpoints: tuple[LongArray, LongArray],
+    grid: OccupancyGrid,
+    found: FoundMany | None,
+) -> BoolArray:
+    """Return which queries meet closed cells with an endpoint, or with their paths, bool (n,).
+
+    Only paths of cells are given; None for others.
+    """
+    across = np.array([grid.shape[1], 1])
+    met: BoolArray = closed.holds(endpoints[0] @ across) | closed.holds(endpoints[1] @ across)
+    if found is None:
+        return met
+    for k in np.flatnonzero(found.is_done & ~met).tolist():
+        points = found.points[found.path_start[k] : found.path_start[k + 1]]
+        met[k] = len(points) and closed.meets(grid.frame.cells_of(points), grid)
+    return met
+
+
+def _are_free(grid: OccupancyGrid, cells: LongArray) -> BoolArray:
+    """Return whether cells (n, 2) lie on the map and are free."""
+    classes = grid.classes
+    inside = ((cells >= 0) & (cells < classes.shape)).all(axis=1)
+    free = np.zeros(len(cells), dtype=np.bool_)
+    free[inside] = classes[tuple(cells[inside].T)] == CellClass.FREE
+    return free

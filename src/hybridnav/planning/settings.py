@@ -1,5 +1,5 @@
 """The sections of a preset: of the pyramid, and of the planner by each method. Public:
-`ClearanceSettings` and `CostSettings`.
+`ClearanceSettings`, `CostSettings` and `LimitSettings`.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ def _class_name(refine: str) -> str:
 
 _Float = Annotated[float, BeforeValidator(no_boolean)]
 _Int = Annotated[int, BeforeValidator(no_boolean)]
+_Limit = Annotated[_Float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Section(BaseModel):
@@ -107,7 +108,31 @@ class CostSettings(Section):
     """Distance from obstacles; null for no such costs."""
 
 
-Finish = Literal["none", "line-of-sight", "arcs"]
+class LimitSettings(Section):
+    """Section `limits`: how fast the robot drives, see `MotionLimits`; `duration_s` needs them.
+
+    Examples
+    --------
+    >>> hn.load_preset("robot", overrides=["limits.max_speed_m_s=0.26"]).limits.max_speed_m_s
+    0.26
+    """
+
+    max_speed_m_s: _Limit = 0.5
+    """Speed ahead and backwards, m / s."""
+    max_acceleration_m_s2: _Limit = 2.5
+    """Gain of speed, m / s^2."""
+    max_deceleration_m_s2: _Limit = 2.5
+    """Loss of speed when braking, m / s^2."""
+    max_lateral_acceleration_m_s2: _Limit = 1.0
+    """Speed^2 * curvature on arcs, m / s^2."""
+    max_turning_rate_rad_s: _Limit = 2.0
+    """Turn of the heading, rad / s."""
+    max_angular_acceleration_rad_s2: _Limit = 3.2
+    """Change of the turning rate in turns on the spot, rad / s^2."""
+
+
+Smooth = Literal["none", "line-of-sight", "arcs"]
+"""What is smoothed of a path."""
 
 
 class PlannerSettings(Section):
@@ -127,7 +152,7 @@ class PlannerSettings(Section):
     """Whether the method plans on the places of the map, and not on its cells alone."""
 
     @property
-    def finish(self) -> Finish:
+    def finish(self) -> Smooth:
         """Smoothing of the path that the method finds."""
         return "none"
 
@@ -198,13 +223,13 @@ class OctileSettings(PlannerSettings):
     """Whether the path is shortened to an any-angle one."""
 
     @property
-    def finish(self) -> Finish:
+    def finish(self) -> Smooth:
         """Smoothing of the path of cells."""
         return self.smooth
 
 
 class _ByCosts(PlannerSettings):
-    smooth: Finish = "none"
+    smooth: Smooth = "none"
     """Whether a path of cells is moved to a cheaper one at any angle; `arcs`, which goes with
     costs, also rounds the bends."""
     turning_radius_m: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] = 0.3
@@ -213,7 +238,7 @@ class _ByCosts(PlannerSettings):
     """Factors by which metres cost more, and the path is the cheapest; null for lengths."""
 
     @property
-    def finish(self) -> Finish:
+    def finish(self) -> Smooth:
         """Smoothing of the path of cells."""
         return self.smooth
 

@@ -15,7 +15,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.geometry import least_along
-from hybridnav.planning.preset import LimitSettings
+from hybridnav.planning.settings import LimitSettings
 
 if TYPE_CHECKING:
     from hybridnav._base.poses import Spread

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, on_demand
+from hybridnav._base.copies import copies_alike
 from hybridnav._base.typing import BoolArray, IntArray, LongArray
 from hybridnav.rooms import Rooms
 from hybridnav.topology import TopologicalMap
@@ -134,43 +134,27 @@ class RouteFinder:
         return next(own, passable[0] if passable else None)
 
 
-@on_demand("cells")
-@dataclass(frozen=True, eq=False)
-class RouteOfCells:
-    """The route of one cell path, which is found when somebody reads it."""
-
-    topology: TopologicalMap
-    finder: RouteFinder
-    cells: LongArray
-    """int64 (n, 2), legal moves."""
-
-    def route(self) -> Route:
-        """Return the ids of the places and arcs that the path passes."""
-        places, arcs = self.finder.of(self.cells)
-        place_ids, arc_ids = self.topology.place_ids, self.topology.arc_ids
-        passed = [int(arc_ids[arc]) if arc >= 0 else -1 for arc in arcs]
-        return Route(tuple(place_ids[places].tolist()), tuple(passed))
+def route_of_cells(topology: TopologicalMap, finder: RouteFinder, cells: LongArray) -> Route:
+    """Return the ids of the places and arcs that a path passes; `cells`: int64 (n, 2), legal
+    moves."""
+    places, arcs = finder.of(cells)
+    place_ids, arc_ids = topology.place_ids, topology.arc_ids
+    passed = [int(arc_ids[arc]) if arc >= 0 else -1 for arc in arcs]
+    return Route(tuple(place_ids[places].tolist()), tuple(passed))
 
 
-@dataclass(frozen=True, eq=False)
-class RouteOfPlaces:
-    """A route of places whose arcs are chosen when somebody reads it."""
-
-    topology: TopologicalMap
-    places: IntArray
-    """int32 (n,), dense indices; an arc joins each to the next."""
-
-    def route(self) -> Route:
-        """Return the route, of parallel arcs the one with the least `through_m`."""
-        level, ids = self.topology.level, self.topology.arc_ids
-        ends = np.sort(level.arcs, axis=1)
-        chosen = []
-        for pair in itertools.pairwise(self.places.tolist()):
-            arcs = np.flatnonzero((ends == sorted(pair)).all(axis=1))
-            # The lengths through all arcs take a search of the whole map.
-            best = arcs[np.argmin(level.through_m[arcs])] if len(arcs) > 1 else arcs[0]
-            chosen.append(int(ids[best]))
-        return Route(tuple(self.topology.place_ids[self.places].tolist()), tuple(chosen))
+def route_of_places(topology: TopologicalMap, places: IntArray) -> Route:
+    """Return the route of some places, int32 (n,), dense indices, an arc from each to the next: of
+    parallel ones that with the least `through_m`."""
+    level, ids = topology.level, topology.arc_ids
+    ends = np.sort(level.arcs, axis=1)
+    chosen = []
+    for pair in itertools.pairwise(places.tolist()):
+        arcs = np.flatnonzero((ends == sorted(pair)).all(axis=1))
+        # The lengths through all arcs take a search of the whole map.
+        best = arcs[np.argmin(level.through_m[arcs])] if len(arcs) > 1 else arcs[0]
+        chosen.append(int(ids[best]))
+    return Route(tuple(topology.place_ids[places].tolist()), tuple(chosen))
 
 
 @dataclass(frozen=True, eq=False)

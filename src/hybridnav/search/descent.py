@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from copy import copy
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -336,15 +336,19 @@ class Descent:
             successors,
             UNLIMITED,
         )
+        self._field_of: IntArray | None = None
         self.n_cells = int(np.count_nonzero(enterable))
         """Cells that paths may use."""
         self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._ground.moves))
         self._works = Pool(partial(_Work, self.fields, enterable.size))
 
-    @cached_property
+    @property
     def field_of(self) -> IntArray:
         """int32 (rows, cols), the last field of each cell; -1 for none."""
-        return np.append(self._ground.field_of, -1).astype(np.int32)[self._lowest.field_of]
+        if self._field_of is None:
+            fields = np.append(self._ground.field_of, -1).astype(np.int32)
+            self._field_of = fields[self._lowest.field_of]
+        return self._field_of
 
     def changed(self, patch: Patch, enterable: BoolArray, units: IntArray | None) -> Descent | None:
         """Return the descents of a map after a change, this one stays as it is.
@@ -362,7 +366,6 @@ class Descent:
         if is_small is not (lowest.top is None) or levels[1:] != lowest.levels[1:]:
             return None
         made = copy(self)
-        vars(made).pop("field_of", None)
         now = patched(lowest, patch, levels, ended, units)
         Descent._lay(made, now, enterable, by_units=units is not None)
         return made

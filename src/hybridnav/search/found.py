@@ -13,17 +13,19 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from hybridnav._base.copies import made
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.trig import dist
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from hybridnav._base.copies import Source
     from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer
-    from hybridnav.route.route import Route, RouteOfPlaces
+    from hybridnav.route.route import Route
     from hybridnav.search.directed import DirectedSides
     from hybridnav.search.distance_table import LabelSource
     from hybridnav.topology import TopologicalMap
@@ -190,17 +192,18 @@ class QueryMany(NamedTuple):
 class Found:
     """The answer to one query: a path with its cost and bound, or the proof that there is none."""
 
-    passed: LongArray | Callable[[], LongArray] | None
+    cells_source: Source[LongArray] | None
     """The cells of the path, or how to find them; None without a path."""
-    cost: float | Callable[[], float] = math.inf
+    cost_source: Source[float] = math.inf
     """Length or cost in the metric of the method, metres, or how to find it; infinite without a
     path."""
     lower_bound_m: float = math.inf
     """Proved bound on the cost of all paths; infinite where it is proved that there is none."""
     points: FloatArray | None = None
     """float64 (m, 2), centres of the cells if known already, or where an any-angle path turns."""
-    route: Route | RouteOfPlaces | None = None
-    """The route that was chosen before the path; None to derive it from the path."""
+    route_source: Source[Route] | None = None
+    """The route that was chosen before the path, or how to name it; None to derive it from the
+    path."""
     optimum: Callable[[], float] | None = None
     """How to find the least cost of all paths of cells, metres, for those who read a gap; None
     where `lower_bound_m` is all that is known."""
@@ -211,18 +214,18 @@ class Found:
     @property
     def has_path(self) -> bool:
         """Whether there is a path."""
-        return self.passed is not None
+        return self.cells_source is not None
 
     @cached_property
     def cost_m(self) -> float:
         """Length or cost in the metric of the method, metres; infinite without a path."""
-        return self.cost() if callable(self.cost) else self.cost
+        return made(self.cost_source)
 
     @cached_property
     def cells(self) -> LongArray:
         """int64 (n, 2), legal moves from start to goal; only of an answer with a path."""
-        assert self.passed is not None  # noqa: S101 - the caller has looked
-        return self.passed() if callable(self.passed) else self.passed
+        assert self.cells_source is not None  # noqa: S101 - the caller has looked
+        return made(self.cells_source)
 
 
 @dataclass(frozen=True, eq=False)

@@ -285,7 +285,7 @@ class MapAnswers(_Answers):
             raise places.nothing(asked.of, "nothing", known, self._places.choices)
 
         def plan(point: places.Point) -> tuple[float, dict[str, Any]]:
-            found = planner.draft(here, point, blocked=shut)
+            found = planner.plan(here, point, blocked=shut)
             if not math.isfinite(found.cost):
                 return found.cost, {}
             bound_m = places.rounded_down(found.lower_bound)

@@ -175,7 +175,7 @@ class FloorTable:
         missing = np.argwhere(is_missing)
         if len(missing):
             found = self.floor.planner.plan_many(*self.positions_m[missing.T], blocked=self.closed)
-            source, costs = found.bound_source, found.cost.tolist()
+            source, costs = found.lower_bound_source, found.cost.tolist()
             # Bounds that take a search of their own are left to the pairs of a route.
             bounds = np.zeros(len(costs)) if callable(source) else source
             for (start, goal), cost, bound in zip(missing.tolist(), costs, bounds, strict=True):

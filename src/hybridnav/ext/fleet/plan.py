@@ -12,6 +12,7 @@ from typing import Any, overload
 from typing_extensions import Self
 
 from hybridnav._base.clock import clock
+from hybridnav._base.copies import Source, made, made_state
 from hybridnav.errors import PlanError
 from hybridnav.ext.fleet.floors import ROUNDED, Floor
 from hybridnav.ext.fleet.links import START, LinkNetwork, Part, Ride
@@ -58,8 +59,8 @@ class BuildingPlan:
     """Metres per second that the robot drives."""
     stats: PlanStats = field(default_factory=PlanStats)
     """Effort of the query, with that for plans which are not on the route."""
-    instruction_source: GuidedRoute | tuple[Instruction, ...] = field(default=(), repr=False)
-    """The instructions, or the data to find them from."""
+    instructions_source: Source[tuple[Instruction, ...]] = field(default=(), repr=False)
+    """The instructions, or how to find them."""
     profile: str | None = None
     """Name of the profile that it was planned under; None for none."""
     note: str = ""
@@ -74,13 +75,11 @@ class BuildingPlan:
     @cached_property
     def instructions(self) -> tuple[Instruction, ...]:
         """Instructions for a person; none without a route, and if no floor has rooms."""
-        source = self.instruction_source
-        return source if isinstance(source, tuple) else source.instructions()
+        return made(self.instructions_source)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with what is found on demand, so that copies hold no map."""
-        state = {name: value for name, value in vars(self).items() if name != "instructions"}
-        return state | {"instruction_source": self.instructions}
+        return made_state(self)
 
     @property
     def solved(self) -> bool:
@@ -238,10 +237,10 @@ class Answers:
             ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
             chosen = list(itertools.islice(ranked, count))
         bound = search.bound()
-        results = [tuple(search.drafts[part].result() for part in one.parts) for one in chosen]
-        stats = stats_of([draft.stats for draft in search.planned], clock() - began)
+        results = [tuple(search.results[part] for part in one.parts) for one in chosen]
+        stats = stats_of([result.stats for result in search.planned], clock() - began)
         if not chosen:
-            metrics = [draft.result().metric for draft in search.planned[:1]]
+            metrics = [result.metric for result in search.planned[:1]]
             refused = self.refused(search.reason(), endpoints)
             metric = metrics[0] if metrics else refused.metric
             return (replace(refused, metric=metric, lower_bound=bound, stats=stats),)
@@ -281,7 +280,7 @@ class Answers:
             lower_bound=cost if bound >= cost * ROUNDED else bound,
             speed_m_s=self._speed_m_s,
             stats=stats,
-            instruction_source=guided,
+            instructions_source=guided,
         )
 
     def _floor_of(self, part: Part, endpoints: tuple[Endpoint, Endpoint]) -> int:
@@ -316,7 +315,7 @@ class GuidedRoute:
     goal: str
     """What words call the goal."""
 
-    def instructions(self) -> tuple[Instruction, ...]:
+    def __call__(self) -> tuple[Instruction, ...]:
         """Find the instructions; none if no floor has rooms."""
         if all(guide is None for guide in self.guides):
             return ()

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.ext.fleet.floors import ROUNDED, FloorTable
 from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, LinkNetwork, Part
-from hybridnav.planning import HybridPlanner, PlanStats, PlanStatus
+from hybridnav.planning import HybridPlanner, PlanResult, PlanStats, PlanStatus
 from hybridnav.planning.named import At
-from hybridnav.planning.result import PlanDraft
 from hybridnav.search.found import ClosedCells
 
 _MOST_LABELS = 20_000
@@ -86,9 +85,9 @@ class LinkSearch:
     ) -> None:
         self._network, self._tables, self._closed, self._at = network, tables, closed, at
         self._start, self._goal = endpoints
-        self.drafts: dict[Part, PlanDraft] = {}
+        self.results: dict[Part, PlanResult] = {}
         """The plans of parts that were asked for."""
-        self.planned: list[PlanDraft] = []
+        self.planned: list[PlanResult] = []
         """Those made for this query."""
         self.is_complete = True
         """Whether `ranked` has looked at all routes that keep to the limit."""
@@ -123,8 +122,8 @@ class LinkSearch:
     def reason(self) -> PlanStatus:
         """Return why there is no route, after one was searched."""
         statuses = []
-        for (start, goal), draft in self.drafts.items():
-            status = draft.status
+        for (start, goal), result in self.results.items():
+            status = result.status
             if status.name.startswith("START") and start == START:
                 return status
             if status.name.startswith("GOAL") and goal == GOAL:
@@ -154,10 +153,10 @@ class LinkSearch:
         """Plan the parts that were not, until one costs more than expected; return whether none
         does. Those come first whose cost is not known, as they may rule the route out."""
         for part in sorted(parts, key=self._is_known):
-            if part not in self.drafts:
+            if part not in self.results:
                 before = self._expected(part)
                 self._plan(part)
-                if self.drafts[part].status is PlanStatus.NO_PATH:
+                if self.results[part].status is PlanStatus.NO_PATH:
                     self._divide(self._floor_of(part))
                 if not self._expected(part) <= before / ROUNDED:
                     return False
@@ -175,8 +174,7 @@ class LinkSearch:
         table, closed = self._tables[floor], self._closed_on(floor)
         if start != START and goal != GOAL and floor not in self._closed:
             rows = self._network.ends[start].at, self._network.ends[goal].at
-            result, was_kept = table.between(*rows)
-            found = PlanDraft.of(result)
+            found, was_kept = table.between(*rows)
         else:
             found, was_kept = self._between(table, part, closed), False
             costs, key = self._slot(part)
@@ -184,7 +182,7 @@ class LinkSearch:
             costs.lower[key] = max(costs.lower[key], found.lower_bound)
             if floor not in self._closed and (start == START) != (goal == GOAL):
                 self._compare(table, part, found)
-        self.drafts[part] = found
+        self.results[part] = found
         if not was_kept:
             self.planned.append(found)
 
@@ -218,14 +216,14 @@ class LinkSearch:
                 x, y = np.asarray(end.waypoint, dtype=np.float64)[:2].tolist()
                 outer.lower[on_floor[own[rows] != part_of[frame.cell_of(x, y)]]] = np.inf
 
-    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> PlanDraft:
+    def _between(self, table: FloorTable, part: Part, closed: ClosedCells | None) -> PlanResult:
         start, goal = (
             end.waypoint if number == of else table.positions_m[self._network.ends[number].at]
             for number, of, end in zip(part, (START, GOAL), (self._start, self._goal), strict=True)
         )
-        return table.floor.planner.draft(start, goal, blocked=closed, at=self._at)
+        return table.floor.planner.plan(start, goal, blocked=closed, at=self._at)
 
-    def _compare(self, table: FloorTable, part: Part, found: PlanDraft) -> None:
+    def _compare(self, table: FloorTable, part: Part, found: PlanResult) -> None:
         """Raise the bounds of other parts from the start, or to the goal, by the triangle
         inequality; a name is not one point, and has none."""
         end = self._start if part[0] == START else self._goal

@@ -360,9 +360,9 @@ class _OverFloors:
 
     def _words(self, plan: BuildingPlan, query: PathQuery) -> dict[str, Any]:
         """Return the lines of a plan, which call its goal by its name."""
-        source = plan.instruction_source
+        source = plan.instructions_source
         if query.goal.name is not None and isinstance(source, GuidedRoute):
-            plan = replace(plan, instruction_source=replace(source, goal=query.goal.name))
+            plan = replace(plan, instructions_source=replace(source, goal=query.goal.name))
         numbers = [self._number_of[name] for name in plan.floors]
         floors = [(number, self.sessions[number].grid) for number in numbers]
         return {"words": lines_of(plan.instructions, query.language, floors)}

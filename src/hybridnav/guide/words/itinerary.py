@@ -9,7 +9,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybridnav._base.trig import hypots
 from hybridnav._base.typing import LongArray
 from hybridnav.guide.words import Instruction
 from hybridnav.guide.words.bends import Leg
@@ -20,9 +19,9 @@ from hybridnav.planning import HybridPlanner, Path
 from hybridnav.rooms import Door, Rooms
 from hybridnav.rooms.listing import FOUND_NAME, WIDEST_CORRIDOR_M
 from hybridnav.route import RouteFinder
+from hybridnav.route.visits import visits_of
 from hybridnav.topology import TopologicalMap
 
-_SLIVER_M = 0.5
 _LEAST_ROOM_M2 = 6.0
 _LEAST_HALL_M2 = 60.0
 _LONG_SHAPE = 3.0
@@ -60,38 +59,19 @@ class Guide:
         cell path; `waypoint`: waypoint at the end of the path. Result: at least one leg; the
         lengths sum to that of the path.
         """
-        rooms, cells = self._rooms, path.cells
-        vertices, arcs, steps = self._route_finder.crossings(cells)
-        along = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(cells, axis=0).T))])
-        scale = path.length_m / along[-1] if along[-1] > 0 else 0.0
-        labels = rooms.label_of_vertex[vertices].tolist()
-        crossed = [number for number in range(len(arcs)) if labels[number] != labels[number + 1]]
-        legs: list[Leg] = []
-        begun, from_step = 0.0, 0
-        for number in crossed:
-            step = steps[number]
-            # A diagonal past the corner of a third room crosses two boundaries, both at its middle.
-            ended = (along[step] + along[step + 1]) / 2
-            x, y = rooms.grid.frame.points_of(cells[step : step + 2]).mean(axis=0).tolist()
-            legs.append(
-                Leg(
-                    rooms.name_of(labels[number]),
-                    float((ended - begun) * scale),
-                    rooms.door_of_arc.get(arcs[number]),
-                    endpoint=(x, y),
-                    shape=self._shape(vertices[number], cells[from_step : step + 1]),
-                )
+        found = visits_of(self._rooms, self._route_finder, path.cells, path.length_m)
+        legs = [
+            Leg(
+                self._rooms.name_of(one.label),
+                one.length_m,
+                one.door,
+                endpoint=one.end,
+                shape=self._shape(one.vertex, one.cells),
             )
-            begun, from_step = ended, step + 1
+            for one in found
+        ]
         x, y = path.points[-1].tolist()
-        last = Leg(
-            rooms.name_of(labels[-1]),
-            float((along[-1] - begun) * scale),
-            waypoint=waypoint,
-            endpoint=(x, y),
-            shape=self._shape(vertices[-1], cells[from_step:]),
-        )
-        return _without_grazes([*legs, last])
+        return [*legs[:-1], replace(legs[-1], waypoint=waypoint, endpoint=(x, y))]
 
     def doors(self, path: Path) -> list[Door]:
         """Return the doors and openings that a path passes."""
@@ -159,20 +139,3 @@ def instructions_of(
     guide = _guide_on(topology)
     legs = guide.legs(path, waypoint=waypoint_text(goal))
     return guide.instructions([path], [legs], heading_rad=heading_of(start))
-
-
-def _without_grazes(legs: Sequence[Leg]) -> list[Leg]:
-    """Join the legs on both sides of a leg that only touches a room.
-
-    Such a leg enters by a door and returns by the same one within half a metre.
-    """
-    kept: list[Leg] = []
-    for leg in legs:
-        kept.append(leg)
-        while len(kept) > 2:  # noqa: PLR2004
-            before, within, behind = kept[-3:]
-            if before.door is None or before.door != within.door or within.length_m > _SLIVER_M:
-                break
-            length_m = before.length_m + within.length_m + behind.length_m
-            kept[-3:] = [replace(behind, length_m=length_m)]
-    return kept

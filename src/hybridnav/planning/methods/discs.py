@@ -12,8 +12,8 @@ from hybridnav._base.copies import copies_alike
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import cost_along
-from hybridnav.planning.costs import CostFinish
 from hybridnav.planning.endpoints import refusal
+from hybridnav.planning.finishes import CostFinish
 from hybridnav.planning.methods.cheapest import OverLattice
 from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.methods.shortest import OverMesh

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike, filled
+from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import behind
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
@@ -47,8 +47,8 @@ class OverJumps(Method):
     def __init__(self, known: KnownMap, settings: PlannerSettings) -> None:
         self._grid, self._settings = known.grid, settings
         self._allow_unexplored = settings.allow_unexplored
+        self._known = known._replace(prepared=None)
         self._whole_map = WholeMap(known, settings)
-        self._refiner, _ = self._whole_map.refiners
         self._search = known.prepared if isinstance(known.prepared, JumpSearch) else None
         self._building = threading.RLock()  # a progress callback may plan
         self._begun = threading.Lock()
@@ -69,7 +69,8 @@ class OverJumps(Method):
                     if graph.n_corners >= CONTRACTED_FROM:
                         graph = contract_graph(graph)
                     self._search = JumpSearch(graph)
-                    vars(self._refiner).pop("search", None)  # of the first answers, 5 bytes a cell
+                    # Without the search of the first answers, 5 bytes a cell.
+                    self._whole_map = WholeMap(self._known, self._settings)
                     progress(2, 2)
         return self._search
 
@@ -100,12 +101,12 @@ class OverJumps(Method):
         now = clock()
         path = (self._search or self.prepare()).path(*query.cells)
         seconds["jumps"] = clock() - now
-        stats = filled(PlanStats, expanded=path.expanded, seconds=seconds)
+        stats = PlanStats(path.expanded, seconds=seconds)
         if path.cells is None:
             return Found(None, stats=stats)
         length_m = path.length_cells * self._grid.resolution_m
-        found = filled(Found, passed=path.cells, cost=length_m, lower_bound_m=length_m, stats=stats)
-        return round_closed(found, query, self._refiner)
+        found = Found(path.cells, length_m, length_m, stats=stats)
+        return round_closed(found, query, self._whole_map.refiners[0])
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the contracted graph, of the map with closed cells; see `Method`."""

@@ -12,17 +12,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import Motion
 from hybridnav._base.trig import directions, dist
 from hybridnav.maps.geometry import cells_of_line, polyline_length
-from hybridnav.planning import Path, PlanStatus, Refinement
+from hybridnav.planning.finishes import Finished, Refinement
 from hybridnav.planning.methods.discs import Discs
+from hybridnav.planning.path import Path
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import Curve, Pose, driven, shortest_curve
 from hybridnav.refine.ompl import Corridors, OmplQuery, Setup, Worker
 from hybridnav.refine.one_way import led, obeys, shorten
-from hybridnav.search.found import ClosedCells, Found, Method, Query
+from hybridnav.search.found import ClosedCells, Found, Method, PlanStatus, Query
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,8 +35,9 @@ if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning import Metric
+    from hybridnav.planning.costs import PlannerCosts
+    from hybridnav.planning.finishes import Answer
     from hybridnav.planning.methods.grid import KnownMap
-    from hybridnav.planning.result import Answer
     from hybridnav.planning.settings import OmplPlannerSettings
     from hybridnav.refine.ompl import Reply, Search
 
@@ -86,6 +89,36 @@ def ompl_planner(known: KnownMap, method: Method, settings: OmplPlannerSettings)
         cell, (point,) = (int(free[0, 0]), int(free[0, 1])), grid.frame.points_of(free)
         _ = method.find(Query((cell, cell), (point, point))).cells
     return OmplPlanner(grid, settings, field_of, known.costs)
+
+
+@copies_alike
+class Sampled:
+    """Paths along those of a method, in the robot's space; a finish of paths.
+
+    `costs`: what they close for all queries; `metric`: that of the method.
+    """
+
+    def __init__(self, ompl: OmplPlanner, costs: PlannerCosts, metric: Metric) -> None:
+        self._ompl, self._costs, self._is_any_angle = ompl, costs, metric == "any-angle"
+
+    def finished(self, query: Query, found: Found) -> Finished:
+        """Return the path refined by OMPL, with the bound of the method too; see `Finish`."""
+        now = clock()
+        first, last = (np.array([*pose, 0.0][:3]) for pose in query.poses)
+        end = self._ompl.plan(
+            found.cells,
+            (first, last),
+            self._costs.closing(query.closed),
+            spent_s=now - query.began,
+            least_m=found.lower_bound_m if self._is_any_angle else query.straight_m,
+            along=found,
+        )
+        found.stats.seconds["ompl"] = clock() - now
+        path = end.path
+        if path is not None and path.headings_rad is None and end.status is PlanStatus.SOLVED:
+            path = path.turned_at_ends(*query.poses)
+        cost, status, how = end.weighted_cost, end.status, end.refinement
+        return Finished(end.metric, path, end.lower_bound, cost, status=status, refinement=how)
 
 
 def _query_of(

@@ -14,16 +14,19 @@ from typing import TYPE_CHECKING
 
 from hybridnav import route as routes
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike, filled
+from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import octile_distance_in_cells
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, on_cells, round_closed
-from hybridnav.route.route import Route, RouteOfPlaces
+from hybridnav.route.route import Route, route_of_places
 from hybridnav.search.descent import Descent, DescentSettings
 from hybridnav.search.found import Found, Method, PlanStats
 from hybridnav.topology.map import is_version
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from hybridnav._base.copies import Source
     from hybridnav._base.typing import IntArray, LongArray
     from hybridnav.planning.settings import PaperSettings
     from hybridnav.route import MaxDistanceSearch
@@ -131,32 +134,23 @@ class MaxDistance(Method):
         """Return the path that a descent finds down to the cells, None to search the whole map."""
         places, cells, expanded, fields, corridor_cells, length = descent.find(*query.cells)
         seconds = {"descent": clock() - began}
-        stats = filled(
-            PlanStats,
-            expanded=expanded,
-            expanded_places=fields,
-            corridor_cells=corridor_cells,
-            seconds=seconds,
-        )
+        stats = PlanStats(expanded, fields, 0, corridor_cells, seconds)
         if cells is None:
             # Fields of one class that meet by sides are joined by arcs: no route, no path.
             return None if self._topology.grid.corner_cutting else Found(None, stats=stats)
         per_cell = self._resolution_m
-        return filled(
-            Found,
-            passed=cells,
-            cost=length * per_cell,
-            lower_bound_m=octile_distance_in_cells(*query.cells) * per_cell,
-            route=self._route_of(places),
+        return Found(
+            cells,
+            length * per_cell,
+            octile_distance_in_cells(*query.cells) * per_cell,
+            route_source=self._route_of(places),
             optimum=partial(self._optimum_m, query, cells),
             stats=stats,
         )
 
-    def _route_of(self, places: IntArray) -> RouteOfPlaces | None:
-        """Return the route of some places, None for none."""
-        return (
-            filled(RouteOfPlaces, topology=self._topology, places=places) if len(places) else None
-        )
+    def _route_of(self, places: IntArray) -> Callable[[], Route] | None:
+        """Return how to name the route of some places, None for none."""
+        return partial(route_of_places, self._topology, places) if len(places) else None
 
     def _down(self, descent: Descent, query: Query, began: float) -> Found | None:
         """Return the path in the last fields of a descent, None to search the whole map."""
@@ -237,7 +231,7 @@ class MaxDistance(Method):
         query: Query,
         began: float,
         corridor: Corridor | None,
-        route: Route | RouteOfPlaces | None,
+        route: Source[Route] | None,
         expanded_places: int,
     ) -> Found | None:
         """Return the path in a corridor, None to search the whole map."""
@@ -252,7 +246,9 @@ class MaxDistance(Method):
             return None
         stats = PlanStats(expanded, expanded_places, 0, corridor.n_cells, seconds)
         bound = octile_distance_in_cells(*query.cells)
-        return replace(on_cells(self._refiner, cells, bound_cells=bound, stats=stats), route=route)
+        return replace(
+            on_cells(self._refiner, cells, bound_cells=bound, stats=stats), route_source=route
+        )
 
     def _over_whole_map(self, query: Query, seconds: dict[str, float]) -> Found:
         """Return the answer on the whole map, with the seconds spent before."""

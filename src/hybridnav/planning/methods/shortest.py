@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike, filled
+from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool
 from hybridnav._base.trig import dist
@@ -156,7 +156,7 @@ class OverMesh(Method):
             points, length_m = line_between(path.positions, ends, self._placing)
             seconds["shortest"] = clock() - began
             cells = partial(self._passed, query, path, seconds)
-            stats = filled(PlanStats, expanded_intervals=path.expanded, seconds=seconds)
+            stats = PlanStats(expanded_intervals=path.expanded, seconds=seconds)
             return _along((points, length_m), path, cells, stats)
         seconds["shortest"] = clock() - began
         stats = PlanStats(expanded_intervals=path.expanded, seconds=seconds)
@@ -327,6 +327,4 @@ def _along(
     """
     (points, length_m), (_, length, bound, _) = line, path
     bound_m = min(length_m * (bound / length), length_m) if length else 0.0
-    return filled(
-        Found, passed=cells, cost=length_m, lower_bound_m=bound_m, points=points, stats=stats
-    )
+    return Found(cells, length_m, bound_m, points, stats=stats)
