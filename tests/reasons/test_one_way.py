@@ -13,6 +13,8 @@ from hybridnav import check_proof
 from tests.one_way import Scene, planner_of, random_scene
 from tests.strategies import examples
 
+# Random lines may lie between blocked cells alone.
+pytestmark = pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
 PRESETS = "shortest", "octile", "grid-astar", "robot"
 CELLS = "octile", "grid-astar"
 WARD = Scene(np.ones((4, 6), bool), np.array([(1, c, 2, c) for c in range(6)]), [])
