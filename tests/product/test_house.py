@@ -16,7 +16,7 @@ from tests.product.house import (
 LIMITS = {
     "code": 64_700,
     "lines": 102_600,
-    "files": 430,
+    "files": 431,
     "code outside ext": 49_800,
     "lines of a file, most": 600,
     "packages": 18,
@@ -28,7 +28,7 @@ LIMITS = {
     "imports, % of the code": 9.1,
     "long kernels without headings": 0,
     "names at the root": 63,
-    "parameters of commands, shared ones once": 125,
+    "parameters of commands, shared ones once": 126,
     "lines of tests": 70_700,
 }
 
@@ -42,7 +42,7 @@ BUDGETS = {
     "ext/page": (3250, 7),
     "graphs": (6600, 8),
     "guide": (3700, 10),
-    "harness": (9700, 11),
+    "harness": (9900, 11),
     "maps": (5420, 7),
     "models": (2180, 6),
     "planning": (6950, 9),

@@ -34,6 +34,14 @@ GraphsOption = Annotated[
         "several times.",
     ),
 ]
+RecordedOption = Annotated[
+    list[Path] | None,
+    option(
+        "--recorded FOLDER",
+        "Recorded paths, in files that `hybridnav judge` reads, as a method on one map; the pairs "
+        "are theirs. May be given several times.",
+    ),
+]
 ClearEdgesOption = Annotated[
     bool, option("--clear-edges", "Leave out edges of the graph that the robot cannot follow.")
 ]
@@ -82,6 +90,7 @@ def evaluate(
     preset: options.PresetOption[list[str] | None] = None,
     baseline: BaselinesOption = None,
     graph: GraphsOption = None,
+    recorded: RecordedOption = None,
     floor: options.GraphFloorOption = None,
     clear_edges: ClearEdgesOption = False,
     pairs: PairsOption = None,
@@ -118,6 +127,7 @@ def evaluate(
         raise UsageError(
             "--all-pairs chooses the pairs: leave out --scen and --pairs, or --all-pairs"
         )
+    from hybridnav.harness.names import NamedMethod  # noqa: PLC0415
     from hybridnav.harness.output import write_outputs  # noqa: PLC0415 - loads every method
     from hybridnav.harness.run import RunSettings  # noqa: PLC0415
 
@@ -134,13 +144,14 @@ def evaluate(
     if floor is not None and not graph:
         raise UsageError("--floor goes with --graph: name the graph, or leave it out")
     _check_maps(map_files)
-    others = baseline or graph
+    others = baseline or graph or recorded
     names = preset if preset is not None else ([] if others else ["shortest"])
     settings = RunSettings(
         maps=tuple(map(str, map_files)),
         presets=tuple(read_settings(name, overrides, None, None) for name in names),
         baselines=tuple(baseline or ()),
         graphs=tuple(_graph(file, floor) for file in graph or ()),
+        methods=tuple(NamedMethod("recorded", str(folder)) for folder in recorded or ()),
         clear_edges_only=clear_edges,
         pairs=pairs,
         lattice_step_m=all_pairs,

@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, cast
 
 from hybridnav._base.clock import clock
@@ -17,6 +18,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import FoundMethod, HybridMethod, close_method
 from hybridnav.harness.baselines import MethodResult, Solver
 from hybridnav.harness.names import NamedMethod, baseline_name, class_of, own_name, source_hash
+from hybridnav.harness.recorded_method import content_of
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.planning import Metric, Preset, load_preset
@@ -43,6 +45,9 @@ BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
 """Class of each baseline and its options; those named in `ON_PLACES` are made from a
 `TopologicalMap`, the others from an `OccupancyGrid`. Those in `benchmarks` are in a checkout alone.
 Work outside this package names its own class as `module:class`."""
+
+RECORDED = "hybridnav.harness.recorded_method:RecordedMethod"
+"""The class of recorded paths."""
 
 ON_PLACES = frozenset({"simple-graph"})
 
@@ -76,10 +81,15 @@ class MethodSpec:
         return self.factory or self.name
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether its paths were recorded: it has no times, and answers on its own map alone."""
+        return self.made_by == RECORDED
+
+    @property
     def metric(self) -> Metric:
         """Metric of its paths; octile for baselines, even for those whose answers have an
         `any_angle` path."""
-        if self.graph is not None:
+        if self.graph is not None or self.is_recorded:
             return "any-angle"
         planner = (self.preset or {}).get("planner", {})
         settings = (
@@ -194,6 +204,8 @@ def named_spec(
     """
     if method.kind in {"baseline", "class"}:
         return baseline_spec(method.source, merge_distance_m=merge_distance_m, named=method)
+    if method.kind == "recorded":
+        return recorded_spec(method)
     if method.kind == "preset":
         overrides = [f"{key}={json.dumps(value)}" for key, value in method.settings.items()]
         preset = load_preset(method.source, overrides=overrides)
@@ -203,6 +215,16 @@ def named_spec(
             raise InvalidValueError(f"a graph has no settings, got {sorted(method.settings)}")
         spec = graph_spec(method.source, clear_edges_only=clear_edges_only)
     return replace(spec, name=method.name or spec.name)
+
+
+def recorded_spec(method: NamedMethod) -> MethodSpec:
+    """Return the method of the paths that a folder has; see `RecordedMethod`."""
+    settings = {"folder": str(Path(method.source).resolve()), **method.settings}
+    if unknown := sorted(method.settings.keys() - {"unit", "frame"}):
+        raise InvalidValueError(f"recorded paths have the settings unit and frame, got {unknown}")
+    name = method.name or f"recorded {Path(method.source).stem}"
+    source = content_of(settings["folder"])
+    return MethodSpec(name, None, factory=RECORDED, settings=settings, source=source)
 
 
 def graph_spec(given: Any, *, clear_edges_only: bool = False) -> MethodSpec:

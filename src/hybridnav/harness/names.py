@@ -55,12 +55,14 @@ class NamedMethod:
     """
 
     kind: str
-    """What `source` names: a "baseline", a "class" as module:class, a "preset", or a "graph"."""
+    """What `source` names: a "baseline", a "class" as module:class, a "preset", a "graph", or the
+    folder of "recorded" paths."""
     source: str
     name: str = ""
     """Name in tables; empty for that of the source."""
     settings: dict[str, Any] = field(default_factory=dict)
-    """Keyword arguments of the class; of a preset, values by dotted key."""
+    """Keyword arguments of the class; of a preset, values by dotted key; of recorded paths `unit`
+    and `frame`, see `load_paths`."""
 
 
 def baseline_name(name: str, known: Iterable[str]) -> str:

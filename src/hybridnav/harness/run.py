@@ -16,7 +16,7 @@ from typing import Any, overload
 
 from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav._base.typing import PathLike
+from hybridnav._base.typing import BoolArray, PathLike
 from hybridnav.errors import InvalidValueError, MapWarning, brief
 from hybridnav.harness.methods import (
     REFERENCE,
@@ -25,8 +25,10 @@ from hybridnav.harness.methods import (
     graph_spec,
     named_spec,
     preset_spec,
+    recorded_spec,
 )
 from hybridnav.harness.names import NamedMethod
+from hybridnav.harness.recorded_method import RecordedMethod
 from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, Record, RecordFile, read_records
 from hybridnav.harness.scenes import (
     SAMPLER_VERSION,
@@ -79,7 +81,8 @@ class RunSettings:
     the nearest node in sight of the start. They take the edges that are shortest in metres, and go
     straight on from the nearest node in sight of the goal."""
     methods: tuple[NamedMethod, ...] = ()
-    """Methods with names and settings of their own."""
+    """Methods with names and settings of their own. Recorded paths go with one map; if there are
+    any, the pairs are those that were recorded, unless a lattice or scenarios are given."""
     clear_edges_only: bool = False
     """Whether edges of these graphs that the robot cannot follow are left out."""
     pairs: int | None = None
@@ -163,10 +166,7 @@ def write_records(
     if settings.limit_s is not None and not settings.limit_s > 0:
         raise InvalidValueError(f"the limit must be positive, got {settings.limit_s} s")
     clear_scenes()  # a file may have changed since the last run of this process
-    if settings.graphs and len(settings.maps) != 1:
-        raise InvalidValueError(
-            f"a graph goes with one map, got {len(settings.maps)} maps: evaluate each by itself"
-        )
+    _check_one_map(settings)
     files = _scenario_files(settings)
     tasks = [
         task
@@ -255,7 +255,11 @@ def _timing_tasks(
     for sha in dict.fromkeys(task.map_sha for task in tasks):
         own = [task for task in tasks if task.map_sha == sha]
         left_out = records.failed | slow
-        made = [task for task in own if (sha, task.method.digest) not in left_out]
+        made = [
+            task
+            for task in own
+            if (sha, task.method.digest) not in left_out and not task.method.is_recorded
+        ]
         methods = {task.method.digest: task.method for task in made}
         without = {
             (task.method.digest, pair.key)
@@ -372,9 +376,45 @@ def _pairs_of(settings: RunSettings, grid: OccupancyGrid, scenarios: str) -> lis
         return evenly_spread(pairs, settings.pairs or len(pairs))
     if settings.lattice_step_m is not None:
         return lattice_pairs(grid, settings.lattice_step_m)
+    recorded = [named for named in settings.methods if named.kind == "recorded"]
+    if recorded:
+        return _recorded_pairs(settings, recorded, grid)
     return sample_pairs(
         grid, _PAIRS if settings.pairs is None else settings.pairs, seed=settings.seed
     )
+
+
+def _check_one_map(settings: RunSettings) -> None:
+    is_recorded = any(named.kind == "recorded" for named in settings.methods)
+    if (settings.graphs or is_recorded) and len(settings.maps) != 1:
+        what = "a graph goes" if settings.graphs else "recorded paths go"
+        raise InvalidValueError(
+            f"{what} with one map, got {len(settings.maps)} maps: evaluate each by itself"
+        )
+
+
+def _recorded_pairs(
+    settings: RunSettings, recorded: Sequence[NamedMethod], grid: OccupancyGrid
+) -> list[Pair]:
+    """Return the pairs of which paths were recorded, those between free cells."""
+    made = [RecordedMethod(grid, **recorded_spec(named).settings) for named in recorded]
+    ends = dict.fromkeys(pair for method in made for pair in method.pairs)
+    free = grid.classes == CellClass.FREE
+    inside = [ends for ends in ends if all(_holds(free, cell) for cell in ends)]
+    if lost := len(ends) - len(inside):
+        warnings.warn(
+            f"{lost:,} of {len(ends):,} recorded paths begin or end in a cell that is not free: "
+            "they are left out; `hybridnav judge` judges them",
+            MapWarning,
+            stacklevel=2,
+        )
+    pairs = [Pair(start, goal, "recorded") for start, goal in inside]
+    return evenly_spread(pairs, settings.pairs or len(pairs))
+
+
+def _holds(free: BoolArray, cell: tuple[int, int]) -> bool:
+    on_map = all(0 <= at < size for at, size in zip(cell, free.shape, strict=True))
+    return on_map and bool(free[cell])
 
 
 def _warn_of(stated: Sequence[Scenario], grid: OccupancyGrid, file: str) -> None:

@@ -122,7 +122,7 @@ def map_digest(grid: OccupancyGrid) -> str:
 # Pairs of start and goal: sampled, on a lattice, or from a scenario file.
 
 Cell = tuple[int, int]
-Kind = Literal["sampled", "across", "lattice", "scenario"]
+Kind = Literal["sampled", "across", "lattice", "scenario", "recorded"]
 
 SAMPLER_VERSION = 1
 """Raised when `sample_pairs` answers otherwise for the same seed; part of every record's run."""

@@ -124,7 +124,7 @@ def run_task(task: Task) -> Iterator[Record]:
                 answer = _too_slow(spent, task.limit_s, f"{done} of {len(task.pairs)} queries")
             else:
                 answer = _answer(prepared, judge, pair)
-                spent += answer.get("seconds", 0.0)
+                spent += answer.get("seconds") or 0.0
             yield {**_of_pair(name, pair, common), **answer}
 
 
@@ -149,14 +149,25 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
         **({"version": str(version)} if (version := getattr(method, "version", "")) else {}),
         **({"settings_text": words} if (words := own_settings(method)) else {}),
         **({"by_costs": True} if prepared.by_costs else {}),
-        "pyramid_seconds": prepared.pyramid_seconds,
-        "method_seconds": prepared.method_seconds,
+        **({} if _is_recorded(prepared) else _times_of(prepared)),
         "n_nodes": int(method.n_nodes),
         "n_edges": int(method.n_edges),
         "memory_bytes": int(method.memory_bytes),
         **({} if method.region_of is None else {"checked": ["regions"]}),
         **fault_fields(Fault("regions", text) for text, _ in judge.region_faults),
         "fault_cells": [cells for _, cells in judge.region_faults],
+    }
+
+
+def _is_recorded(prepared: Prepared) -> bool:
+    """Whether the times would be those of looking paths up."""
+    return bool(getattr(prepared.method, "is_recorded", False))
+
+
+def _times_of(prepared: Prepared) -> Record:
+    return {
+        "pyramid_seconds": prepared.pyramid_seconds,
+        "method_seconds": prepared.method_seconds,
     }
 
 
@@ -268,7 +279,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     began = clock()
     try:
         tell = prepared.ask(pair.start, pair.goal)
-        seconds = clock() - began
+        seconds = None if _is_recorded(prepared) else clock() - began
         answer = tell()
     except Exception as error:  # noqa: BLE001 - a failing method is a result
         return {
@@ -293,7 +304,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
         return {"status": "error", "error": reason, **fault_fields([wrong])}
 
 
-def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float) -> Record:
+def _judged(answer: MethodResult, judge: Judge, pair: Pair, seconds: float | None) -> Record:
     length_m, faults, checks = judge.faults(pair, checked(answer))
     known: Record = {}
     costs: Record = {}
@@ -355,7 +366,7 @@ def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
 
     A method that cannot take that map may yet take those of the run.
     """
-    if (spec.digest, by_costs) in _WARM:
+    if (spec.digest, by_costs) in _WARM or spec.is_recorded:
         return
     grid = example_map("figure1", robot_radius_m=0)
     layer = CostLayer.clearance(grid) if by_costs else None
