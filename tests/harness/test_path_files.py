@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,17 +20,10 @@ GRID = hn.OccupancyGrid(
 POINTS = np.array([[0.5, 0.5], [2.5, 0.5], [2.5, 2.25]])
 
 # Written by evo 1.38.1, file_interface.write_tum_trajectory_file and write_kitti_poses_file, of
-# three poses at 0, 2 and 5.5 s after 1.7e9 s; zeros at the ends of numbers left out.
-TUM = """\
-1.7e+09 5.0e-01 5.0e-01 0.0e+00 0.0e+00 0.0e+00 0.0e+00 1.0e+00
-1.700000002e+09 2.5e+00 5.0e-01 1.000000000000000021e-02 0.0e+00 0.0e+00 0.0e+00 1.0e+00
-1.7000000055e+09 2.5e+00 2.25e+00 0.0e+00 0.0e+00 0.0e+00 0.0e+00 1.0e+00
-"""
-KITTI = """\
-1.0e+00 0.0e+00 0.0e+00 5.0e-01 0.0e+00 1.0e+00 0.0e+00 5.0e-01 0.0e+00 0.0e+00 1.0e+00 0.0e+00
-1.0e+00 0.0e+00 0.0e+00 2.5e+00 0.0e+00 1.0e+00 0.0e+00 5.0e-01 0.0e+00 0.0e+00 1.0e+00 1.0e-02
-1.0e+00 0.0e+00 0.0e+00 2.5e+00 0.0e+00 1.0e+00 0.0e+00 2.25e+00 0.0e+00 0.0e+00 1.0e+00 0.0e+00
-"""
+# three poses at 0, 2 and 5.5 s after 1.7e9 s, byte for byte.
+_FILES = Path(__file__).parent / "files"
+TUM = (_FILES / "evo-1.38.1.tum").read_text()
+KITTI = (_FILES / "evo-1.38.1.kitti").read_text()
 
 
 def read(tmp_path, name, content, **how):
@@ -172,7 +166,7 @@ def test_whole_numbers_and_paths_through_walls_are_asked_about(tmp_path):
         ("a.csv", b"\xff\xfe", "cannot be read"),
         ("a.txt", "1 2 3\n", "lines of 3 words, expected 8"),
         ("a.txt", "", "lines of 0 words"),
-        ("a.txt", TUM.replace("5.0e-01", "x"), "cannot be read"),
+        ("a.txt", TUM.replace("5.000000000000000000e-01", "x"), "cannot be read"),
         ("a.geojson", "{", "cannot be read"),
         ("a.geojson", '{"type": "Point", "coordinates": [0, 0]}', "no path in it"),
         ("a.geojson", '{"type": "LineString", "coordinates": [[0], [1]]}', "points"),

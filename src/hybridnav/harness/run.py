@@ -81,8 +81,8 @@ class RunSettings:
     the nearest node in sight of the start. They take the edges that are shortest in metres, and go
     straight on from the nearest node in sight of the goal."""
     methods: tuple[NamedMethod, ...] = ()
-    """Methods with names and settings of their own. Recorded paths go with one map; if there are
-    any, the pairs are those that were recorded, unless a lattice or scenarios are given."""
+    """Methods with names and settings of their own. Recorded paths go with one map. Theirs are
+    the pairs that are asked, unless a lattice or scenarios are given."""
     clear_edges_only: bool = False
     """Whether edges of these graphs that the robot cannot follow are left out."""
     pairs: int | None = None
