@@ -297,7 +297,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.CORNER_GRAPH, CornerGraph, ()),
         (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
         (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape")),
-        (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors", "uses")),
+        (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors", "uses", "one_way")),
     ],
 )
 def test_a_description_names_every_attribute_of_its_class(

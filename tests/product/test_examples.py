@@ -67,6 +67,8 @@ def _names() -> Iterator[str]:
 
 NAMES = list(_names())
 OTHERS = [
+    "harness.judges.clearance_of",
+    "harness.judges.contacts_of",
     "CostLayer.changed",
     "CostLayer.clearance",
     "CostLayer.cost_of_cells",

@@ -28,7 +28,16 @@ _PARTS = 200
 
 @dataclass(frozen=True)
 class Detour:
-    """A part of a path on which it loses: each metre of loss belongs to one part."""
+    """A part of a path on which it loses: each metre of loss belongs to one part.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.zeros((4, 9)), robot_radius_m=0)
+    >>> points = [(0.5, 0.5), (3.5, 0.5), (3.5, 2.5), (3.5, 0.5), (8.5, 0.5)]
+    >>> (there_and_back,) = hn.judge(grid, points).detours
+    >>> round(there_and_back.loss_m, 6)
+    4.0
+    """
 
     from_m: float
     """Metres along the path at which it begins."""

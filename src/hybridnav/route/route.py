@@ -7,13 +7,17 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.typing import BoolArray, IntArray, LongArray
-from hybridnav.rooms import Rooms
-from hybridnav.topology import TopologicalMap
+
+if TYPE_CHECKING:  # a result is read where there is no map
+    from hybridnav.pyramid import Level
+    from hybridnav.rooms import Rooms
+    from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True)
@@ -62,8 +66,11 @@ class RouteFinder:
     """
 
     def __init__(self, topology: TopologicalMap | Rooms) -> None:
-        self._cols = topology.grid.shape[1]
-        self._level = topology.level
+        self._topology, self._cols = topology, topology.grid.shape[1]
+
+    @cached_property
+    def _level(self) -> Level:
+        return self._topology.level  # that of a version is made here
 
     @cached_property
     def _place_of(self) -> IntArray:

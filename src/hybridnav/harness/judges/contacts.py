@@ -25,7 +25,15 @@ _STEP_CELLS, _MOST_STEPS = 0.25, 1_000_000
 
 @dataclass(frozen=True)
 class Contact:
-    """A piece of a path outside the free space of a map."""
+    """A piece of a path outside the free space of a map.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.array([[0, 0, 1, 1, 0, 0]]), robot_radius_m=0)
+    >>> (met,) = hn.judge(grid, [(0.5, 0.5), (5.5, 0.5)]).contacts
+    >>> met.what, met.from_m, met.to_m, met.depth_m
+    ('obstacle', 1.5, 3.5, 1.0)
+    """
 
     what: str
     """What is met where it is deepest: an "obstacle", what is "near an obstacle" (within the
@@ -44,7 +52,15 @@ class Contact:
 
 @dataclass(frozen=True)
 class Clearance:
-    """Distances from a path to the squares of occupied cells, in metres; infinite without any."""
+    """Distances from a path to the squares of occupied cells, in metres; infinite without any.
+
+    Examples
+    --------
+    >>> grid = hn.OccupancyGrid(np.array([[0, 0, 0, 0], [0, 1, 0, 0]]), robot_radius_m=0)
+    >>> clear = hn.judge(grid, [(0.5, 0.5), (3.5, 0.5)], limit_m=1.0).clearance
+    >>> clear.least_m, clear.limit_m
+    (0.5, 1.0)
+    """
 
     least_m: float
     mean_m: float
