@@ -375,7 +375,7 @@ def test_out_of_order_lasts_until_it_is_opened(cli: Any, office: Path) -> None:
         ("door:7", "door:7 needs its floor, as 1:door:7"),
         ("3:door:7", "no floor is called '3'"),
         ("2:room:2.4", "no room is called '2.4'"),
-        ("lift", "must be link:NAME, door:N or room:NAME"),
+        ("lift", "must be link:NAME, door:N, room:NAME or one-way:RULE"),
     ):
         assert cli("closed", office, "--close", lift, "--close", what).refuses(2, *words)
     assert cli("closed", office).out == "closed     0\n"

@@ -549,7 +549,7 @@ def test_a_map_without_arcs_says_so() -> None:
         ({"rooms": 3}, "rooms must be a sequence of names"),
         (
             {"door": [1]},
-            "takes arcs, places, cells, polygons, doors, rooms, keepout, named, got door",
+            "takes arcs, places, cells, polygons, doors, rooms, keepout, named, one_way, got door",
         ),
         ("door:39", "must be a Blocked, a Door"),
         ([1, 2], "must be a Blocked, a Door, a shapely geometry or a mapping"),

@@ -316,7 +316,7 @@ def test_a_comparison_closes_the_same_for_the_whole_grid(
     ("closed", "code", "words"),
     [
         ("door:9", 2, ["no door has the number 9", "the doors are 1-3"]),
-        ("door:", 2, ["door:N, room:NAME, keepout:FILE or a file", "'door:'"]),
+        ("door:", 2, ["door:N, room:NAME, keepout:FILE, one-way:RULE or a file", "'door:'"]),
         ("door:x", 2, ["number of a door", "'x'"]),
         ("room:kichen", 2, ["'kichen'", "did you mean kitchen"]),
         ("room:", 2, ["'room:'"]),

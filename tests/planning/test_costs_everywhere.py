@@ -29,7 +29,7 @@ from tests.search.test_grid_search import weighted
 HONOUR = {"grid-astar": True, "paper": False, "robot": False}
 """Presets that plan by costs, and whether their paths of cells are the cheapest."""
 REFUSE = {"shortest", "octile", "ompl"}
-COMMANDS = {"plan", "build", "evaluate", "view"}
+COMMANDS = {"plan", "build", "evaluate", "view", "judge"}
 """Commands that make a planner."""
 NO_PLANNER = {"show", "rooms", "compare", "preset", "map", "replay", "explore", "export", "check"}
 NO_PLANNER |= {"closed", "serve", "verify"}  # `serve` plans shortest paths alone

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
-import numpy as np
 import typer
 
 import hybridnav as hn
@@ -161,7 +160,11 @@ def _write(args: JudgeOptions, grid: hn.OccupancyGrid, named: list[tuple[str, Ju
         from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 
         _, worst = max(
-            named, key=lambda each: (not each[1].legal, np.nan_to_num(each[1].loss, nan=-2))
+            named,
+            key=lambda each: (
+                not each[1].legal,
+                -2.0 if math.isnan(each[1].loss) else each[1].loss,
+            ),
         )
         path = worst.optimum.path
         axes = viz.plot_paths(

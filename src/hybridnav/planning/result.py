@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -218,7 +218,9 @@ class PlanResult:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state with all values made, so that copies hold no map."""
-        return made_state(self) | {"ground": None}
+        names = {each.name for each in fields(self)}
+        late = {name: value for name, value in made_state(self).items() if name in names}
+        return late | {"ground": None}
 
     @property
     def solved(self) -> bool:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +15,11 @@ from hybridnav._base.trig import hypots
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.harness.judges import kernels
 from hybridnav.harness.judges.judge import free_classes, grid_positions
-from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_points
+
+if TYPE_CHECKING:  # judges load no more of maps than they need
+    from hybridnav.maps import OccupancyGrid
 
 _WITHIN_CELLS = 1 / 128
 """Cells by which depths, and the least clearance, may be off."""
