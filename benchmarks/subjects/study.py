@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 
 from benchmarks.common import DATA, ROOT, Refused, option
 from benchmarks.subjects._study_beside import CHART as BESIDE_CHART
+from benchmarks.subjects._study_beside import MAP as BESIDE_MAP
 from benchmarks.subjects._study_beside import plot_beside
 from benchmarks.subjects._study_charts import charts_of, write_charts
 from benchmarks.subjects._study_data import LEVELS_FILE, collect
@@ -82,7 +83,8 @@ def write_pages(docs: Path) -> None:
     data = json.loads((docs / FIGURES).read_text(encoding="utf-8"))
     replace_file(docs / "study.md", page(data).encode())
     (docs / "images").mkdir(exist_ok=True)
-    save_figure(plot_beside(data), docs / "images" / BESIDE_CHART)
+    if any(each["map"] == BESIDE_MAP for each in data["maps"]):  # a part of a study may have others
+        save_figure(plot_beside(data), docs / "images" / BESIDE_CHART)
 
 
 OPTIONS = [
