@@ -15,7 +15,7 @@ from tests.product.house import (
 
 LIMITS = {
     "code": 64_700,
-    "lines": 102_600,
+    "lines": 102_700,
     "files": 431,
     "code outside ext": 49_800,
     "lines of a file, most": 600,
