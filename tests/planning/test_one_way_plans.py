@@ -205,7 +205,9 @@ def test_near_goals_and_closed_starts_obey() -> None:
 def test_ompl_goes_in_by_one_door_and_out_by_the_other() -> None:
     pytest.importorskip("ompl")
     topology = map_of(occupancy_grid(TWO_ROOMS), merge_distance_m=3.0)
-    preset = hn.load_preset("ompl", overrides=["planner.along=grid-astar"])
+    preset = hn.load_preset(
+        "ompl", overrides=["planner.along=grid-astar", "planner.ompl.budget_s=30"]
+    )
     both = hn.OneWay(sides=[(1, 6, 1, 7), (7, 7, 7, 6)])
     planner = hn.HybridPlanner(topology, preset=preset)
     sides = both.on(topology.grid)

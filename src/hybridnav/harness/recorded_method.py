@@ -29,7 +29,7 @@ class RecordedMethod:
 
     A path answers the pair of the cells in which it begins and ends; the first of several does. It
     is joined to the centres of these cells, as the harness judges paths between centres. It has no
-    times and no expansions. Of other pairs the answer is "not recorded", which claims nothing.
+    times and no expansions. The answer to other pairs is "not recorded", which claims nothing.
 
     `grid`: the map; `folder`: a folder of files that `load_paths` reads, or one of them; `unit`,
     `frame`: see there. Raises `MapError` when a file cannot be read, or there is none.

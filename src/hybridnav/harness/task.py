@@ -160,7 +160,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
 
 
 def _is_recorded(prepared: Prepared) -> bool:
-    """Whether the times would be those of looking paths up."""
+    """Return whether the times would be those of looking paths up."""
     return bool(getattr(prepared.method, "is_recorded", False))
 
 
