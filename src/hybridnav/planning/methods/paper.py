@@ -118,13 +118,11 @@ class MaxDistance(Method):
             found = self._in_one(search, query, began)
         else:
             found = self._down(search, query, began)
-        is_cut = found is None or self._is_cut(found, query)
-        if is_cut and isinstance(search, Descent):
-            around = self._widened(search, query, found)
-            found, is_cut = around or found, around is None
+        if isinstance(search, Descent) and (found is None or self._is_cut(found, query)):
+            found = self._widened(search, query, found) or found
         if found is None:
             return self._over_whole_map(query, {"coarse": clock() - began})
-        if is_cut:
+        if query.closed is not None and found.has_path:
             found = round_closed(found, query, self._refiner)
         if found.optimum is None and found.has_path and found.lower_bound_m < found.cost_m:
             found = replace(found, optimum=partial(self._optimum_m, query, found.cells))
