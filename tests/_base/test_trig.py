@@ -13,7 +13,20 @@ from numba import njit
 
 import hybridnav._base.jit  # noqa: F401 - makes the functions known to numba
 from hybridnav._base import trig as _trig
-from hybridnav._base.trig import acos, asin, atan2, cos, dist, exp, hypot, hypots, log, sin, tan
+from hybridnav._base.trig import (
+    acos,
+    asin,
+    atan2,
+    cos,
+    dist,
+    exp,
+    hypot,
+    hypots,
+    lengths_along,
+    log,
+    sin,
+    tan,
+)
 
 ODD = [0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 1e-300, -1e300, 5e-324]
 RANGES = [
@@ -70,6 +83,14 @@ def test_lengths_have_equal_bits_in_kernels_in_arrays_and_of_numbers() -> None:
     assert (np.abs(wanted - exact) <= 2 * np.spacing(wanted)).all()
     assert (hypot(1e200, 1.0), *hypots([1e200, 3], [0.0, 4])) == (math.inf, math.inf, 5.0)
     assert hypot(math.inf, 0.0) == math.inf
+
+
+def test_lengths_along_a_line_are_sums_of_the_lengths_of_its_segments() -> None:
+    points = np.random.default_rng(0).uniform(-9, 9, (50, 2))
+    steps = np.diff(points, axis=0)
+    sums = [0.0, *itertools.accumulate(hypots(steps[:, 0], steps[:, 1]).tolist())]
+    assert lengths_along(points).tolist() == sums
+    assert lengths_along(points[:1]).tolist() == [0.0]
 
 
 def test_values_at_the_ends_of_their_ranges() -> None:

@@ -216,6 +216,14 @@ def hypots(x: ArrayLike, y: ArrayLike) -> FloatArray:
         return np.sqrt(rights * rights + ups * ups)
 
 
+def lengths_along(points: ArrayLike) -> FloatArray:
+    """Return the length of a line up to each of its points, float64 (n,).
+
+    `points`: (n, 2), n >= 1; lengths are in their unit.
+    """
+    return np.concatenate([[0.0], np.cumsum(hypots(*np.diff(points, axis=0).T))])
+
+
 def sines_and_cosines(angles_rad: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Return the sines and the cosines of angles in radians, float64 of their shape."""
     angles = np.asarray(angles_rad, dtype=np.float64)

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import hypots, lengths_along
 from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import Clearance, Contact, clearance_of, contacts_of
-from hybridnav.harness.judges.contacts import along_of
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_points
 from hybridnav.maps.costs import cost_along
@@ -122,7 +121,7 @@ class JudgedPath:
         by that grows along the path by what is lost: it is found at 200 places. Parts outside the
         free space, from where there is no way, are left out.
         """
-        along = along_of(self.points)
+        along = lengths_along(self.points)
         if not math.isfinite(self.optimum_m[1]) or self.length_m <= 0:
             return ()
         at = np.linspace(0.0, along[-1], _PARTS + 1)
@@ -151,7 +150,7 @@ class JudgedPath:
         from_m, to_m
             Metres along the path.
         """
-        along = along_of(self.points)
+        along = lengths_along(self.points)
         inner = along[(along > from_m) & (along < to_m)]
         at = np.concatenate([[from_m], inner, [to_m]])
         return np.stack([np.interp(at, along, axis) for axis in self.points.T], axis=1)
@@ -250,7 +249,7 @@ def judge(  # noqa: PLR0913 - all but two have defaults
         low = certain.plan(xy[0], xy[-1]).lower_bound
         is_out = contacts_of(certain.grid, xy, allow_unexplored=allowed) if contacts else ()
         legal = None if contacts and not is_out else legal
-    along = along_of(xy)
+    along = lengths_along(xy)
     turning, curvature = _turns(xy, map_.resolution_m / 2)
     cost, least = (None, None) if costs is None else _costs(costs, xy)
     return JudgedPath(

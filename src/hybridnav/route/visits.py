@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import lengths_along
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import LongArray
@@ -43,7 +41,7 @@ def visits_of(
     which is divided in the proportions of the cells.
     """
     vertices, arcs, steps = finder.crossings(cells)
-    along = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(cells, axis=0).T))])
+    along = lengths_along(cells)
     scale = length_m / along[-1] if along[-1] > 0 else 0.0
     labels = rooms.label_of_vertex[vertices].tolist()
     found: list[RoomVisit] = []

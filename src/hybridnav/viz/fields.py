@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
 from hybridnav._base.rows import unique_rows
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import hypots, lengths_along
 from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 from hybridnav.pyramid import Level
 
@@ -169,7 +169,7 @@ def _between(values: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _evenly(line: FloatArray, spacing: float) -> FloatArray:
-    length = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])
+    length = lengths_along(line)
     at = np.linspace(0, length[-1], max(round(length[-1] / spacing), 12) + 1)
     return np.stack([np.interp(at, length, part) for part in line.T], axis=1)
 

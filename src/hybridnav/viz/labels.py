@@ -17,7 +17,7 @@ from matplotlib.text import Text
 from numpy.typing import ArrayLike
 from scipy import ndimage
 
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import lengths_along
 from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels
 from hybridnav.viz import style
@@ -154,7 +154,7 @@ def _along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
     """
     found = [np.empty((0, 2))]
     for line in lines:
-        where = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])[: len(line)]
+        where = lengths_along(line)[: len(line)]
         if len(line):
             count = 2 + int(min(where[-1] / spacing_m, _MOST_ALONG))
             at = np.linspace(0.0, where[-1], count)
@@ -328,7 +328,7 @@ def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
     """Return the points of lines, with more points between distant ones; float64 (n, 2)."""
     parts = [np.empty((0, 2))]
     for line in lines:
-        lengths_m = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(line, axis=0).T))])
+        lengths_m = lengths_along(line)
         at = np.linspace(0.0, lengths_m[-1], int(lengths_m[-1] / spacing_m) + 2)
         parts.append(np.stack([np.interp(at, lengths_m, axis) for axis in line.T], axis=1))
     return np.concatenate(parts)

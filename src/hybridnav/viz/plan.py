@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import lengths_along
 from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.closures.blocked import Closable
 from hybridnav.errors import InvalidValueError
@@ -203,7 +203,7 @@ def _draw_route(
 def _middles(topology: TopologicalMap, path: FloatArray) -> FloatArray:
     """Return the middle of each stretch of a path in one place, `(x, y)` in metres, shape (n, 2);
     the path is looked up a few times in each cell."""
-    ends_m = np.append(0.0, np.cumsum(hypots(*np.diff(path, axis=0).T)))
+    ends_m = lengths_along(path)
     count = max(1, math.ceil(_LOOKS * ends_m[-1] / topology.grid.resolution_m))
     at_m = (np.arange(count) + 0.5) * (ends_m[-1] / count)
     points = np.column_stack([np.interp(at_m, ends_m, along) for along in path.T])

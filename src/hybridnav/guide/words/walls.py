@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import lengths_along
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.guide.words.instruction import Hand
 
@@ -56,8 +56,8 @@ class RoomWalls:
         """Return how far it is to each side for a person, who walks straight past what is small,
         float64 (n + 1,), in cells."""
         cells = self._sides[[*sides[::step], sides[0]]] // 4
-        row, col = np.divmod(cells, self._inside.shape[1])
-        lengths = np.concatenate([[0.0], np.cumsum(hypots(np.diff(row), np.diff(col)))])
+        row_col = np.stack(np.divmod(cells, self._inside.shape[1]), axis=1)
+        lengths = lengths_along(row_col)
         ends = np.append(np.arange(0, len(sides), step), len(sides))
         return np.interp(np.arange(len(sides) + 1), ends, lengths)
 

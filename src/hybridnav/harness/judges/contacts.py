@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybridnav._base.trig import hypots
+from hybridnav._base.trig import hypots, lengths_along
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.harness.judges import kernels
 from hybridnav.harness.judges.judge import free_classes, grid_positions
@@ -132,7 +132,7 @@ def contacts_of(
     deepest = kernels.farthest(near, first, last, 1.0, _WITHIN_CELLS)
     if not free.any():
         deepest[:, 1] = math.inf
-    begins = along_of(positions)[segment]
+    begins = lengths_along(positions)[segment]
     length = hypots(step[:, 0], step[:, 1])
     ranges = begins[:, None] + spans[:, 1:] * length[:, None]
     # One contact goes on over the points of the path.
@@ -160,12 +160,6 @@ def _what(grid: OccupancyGrid, position: FloatArray) -> str:
     if grid.classes[row, col] == CellClass.UNEXPLORED:
         return "unexplored"
     return "obstacle" if grid.measured[row, col] == CellClass.OCCUPIED else "near an obstacle"
-
-
-def along_of(points: FloatArray) -> FloatArray:
-    """Return the length of a line up to each of its points, float64 (n,)."""
-    steps = np.diff(points, axis=0)
-    return np.concatenate([[0.0], np.cumsum(hypots(steps[:, 0], steps[:, 1]))])
 
 
 def clearance_of(grid: OccupancyGrid, points: ArrayLike, *, limit_m: float) -> Clearance:

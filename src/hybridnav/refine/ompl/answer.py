@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hybridnav._base.moves import path_length_in_cells
-from hybridnav._base.trig import atan2, cos, hypot, hypots, sin
+from hybridnav._base.trig import atan2, cos, hypot, hypots, lengths_along, sin
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.refine.ompl.attempts import Attempts, Simplifier, objective_of
 from hybridnav.refine.ompl.client import OmplQuery, Reply
@@ -99,7 +99,7 @@ def _joints(attempts: Attempts, cells: LongArray) -> list[int]:
         crossings = (np.flatnonzero(np.diff(fields)) + 1).tolist()
     waiting = list(itertools.pairwise(sorted({0, *crossings, last})))[::-1]
     joints = [0]
-    at = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(cells, axis=0).T))])
+    at = lengths_along(cells)
     while waiting:
         first, end = waiting.pop()
         straight = hypot(*(cells[end] - cells[first]))
@@ -209,7 +209,7 @@ def _window(
 
 def _between(points: FloatArray, along: tuple[float, float]) -> tuple[int, int]:
     """Return the indices of the states just before and after a part of a path's length."""
-    at = np.concatenate([[0.0], np.cumsum(hypots(*np.diff(points[:, :2], axis=0).T))])
+    at = lengths_along(points[:, :2])
     first = int(np.searchsorted(at, along[0] * at[-1], side="right")) - 1
     last = int(np.searchsorted(at, along[1] * at[-1]))
     return max(first, 0), min(last, len(points) - 1)
