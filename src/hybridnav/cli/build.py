@@ -84,7 +84,7 @@ def build(args: BuildOptions) -> None:
 def _summary(
     out: Path, topology: hn.TopologicalMap, presets: list[hn.Preset], seconds: dict[str, float]
 ) -> str:
-    grid, size, rooms = topology.grid, out.stat().st_size, topology.pyramid.rooms
+    grid, size, rooms = topology.grid, out.stat().st_size, topology.room_labels
     rows, cols = grid.shape
     per_cell = f"{size / (rows * cols):.1f} bytes a cell"
     cells = f"{cols} x {rows} cells of {grid.resolution_m:g} m"

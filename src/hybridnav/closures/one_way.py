@@ -218,7 +218,7 @@ def directions_on(topology: TopologicalMap, one_way: OneWay | None = None) -> Di
     `one_way`: what else has a direction. Returns None for nothing. Raises `InvalidValueError` when
     the map has no such door.
     """
-    rooms = topology.pyramid.rooms
+    rooms = topology.room_labels
     lasting = None if rooms is None or not rooms.one_way else OneWay.of(rooms.one_way)
     both = joined([lasting, one_way])
     return None if both is None else both.on(topology.grid, topology)

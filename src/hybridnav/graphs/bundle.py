@@ -144,7 +144,7 @@ def export_bundle(  # noqa: PLR0913 - the last four have defaults
     """
     grid = checked_type("topology", topology, TopologicalMap).grid
     checked_type("graph", graph, RouteGraph)
-    if topology.pyramid.rooms is None or graph.grid is not grid:
+    if not topology.has_rooms or graph.grid is not grid:
         raise InvalidValueError(
             "a bundle needs a map with rooms and a graph of it: build the pyramid with rooms="
             "find_rooms(grid), and the graph from that"

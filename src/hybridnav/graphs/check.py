@@ -125,7 +125,7 @@ def check_graph(
     findings.add_all(graph.findings)
     component = np.full(graph.n_nodes, -1, dtype=np.int64)
     component[placed.is_free] = space.component_of[tuple(placed.cells[placed.is_free].T)]
-    rooms = topology.pyramid.rooms
+    rooms = topology.room_labels
     is_beyond = (component >= 0) & space.outside(rooms)[component]
     _add_nodes(findings, graph, placed, grid, component)
     _add_edges(findings, graph, placed, space, is_clear)
@@ -310,7 +310,7 @@ def add_rooms_and_doors(  # noqa: PLR0913, PLR0917 - one call, all of it needed
     (n_components,), the parts of free space that need nodes. Returns number of doors that edges
     pass and of all, of rooms with nodes and of all.
     """
-    if topology.pyramid.rooms is None:
+    if not topology.has_rooms:
         return (0, 0), (0, 0)
     rooms = topology.rooms
     part_of = space.component_of.ravel()

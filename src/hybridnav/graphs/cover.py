@@ -334,7 +334,7 @@ def left_out(topology: TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
         return f"no way leads there from the graph ({area_m2[part]:.1f} m²)"
 
     lines = []
-    if topology.pyramid.rooms is not None:
+    if topology.has_rooms:
         rooms = topology.rooms
         visited = rooms.labels.label_of[tuple(cells.T)]
         for room in np.setdiff1d(np.flatnonzero(rooms.is_listed & rooms.fits), visited).tolist():

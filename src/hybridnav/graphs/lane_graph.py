@@ -144,7 +144,7 @@ def build_lane_graph(  # noqa: PLR0913 - all but the first have defaults
         checked_between("spacing_m", spacing_m, 0.5, 100)
     checked_between("margin_m", margin_m, 0, 100)
     space = FreeSpace.of(topology.grid)
-    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    rooms = topology.rooms if topology.has_rooms else None
     aims = _aims(space, space.kept(rooms), rooms)
     space, part_of = aims.space, np.where(aims.kept_cells, aims.space.component_of, np.int32(-1))
     named = _named(space, part_of, points or {})

@@ -82,7 +82,7 @@ def described(topology: TopologicalMap, nodes: Nodes, edges: LongArray) -> Route
     positions = nodes.positions
     free = np.ascontiguousarray(grid.enterable(allow_unexplored=False))
     edges = edges[~against(topology, positions[edges], free)]
-    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    rooms = topology.rooms if topology.has_rooms else None
     clearance = rooms.clearance_m if rooms is not None else measured_clearance_m(grid)
     clearances, middles = least_along(free, np.ascontiguousarray(clearance), positions, edges)
     occupied = np.ascontiguousarray(grid.measured == CellClass.OCCUPIED)

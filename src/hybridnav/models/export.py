@@ -300,7 +300,7 @@ def _place(topology: TopologicalMap, place: int) -> dict[str, Any]:
     x, y = topology.positions[place].tolist()
     kind = CellClass(topology.classes[place]).name.lower()
     room = None
-    if topology.pyramid.rooms is not None:
+    if topology.has_rooms:
         row, col = topology.level.cells[place].tolist()
         room = topology.rooms.name_of(int(topology.rooms.labels.label_of[row, col]))
     area_m2 = _rounded(float(topology.areas_m2[place]))

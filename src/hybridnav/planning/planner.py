@@ -146,7 +146,7 @@ class HybridPlanner(Questions):
     def pyramid_rooms(self) -> RoomLabels | None:
         """The rooms of the map; None without rooms, or while its places are not built."""
         own = self._now.topology
-        return own.pyramid.rooms if own is not None and own.has_rooms else None
+        return None if own is None else own.room_labels
 
     @property
     def costs(self) -> CostLayer | None:

@@ -213,9 +213,7 @@ class Planning:
     def _directed(self) -> ClosedCells | None:
         """The directions of the rooms, for all queries; None without any."""
         built = self.built
-        if built is None or not built.has_rooms:  # without making a version dense
-            return None
-        if (rooms := built.pyramid.rooms) is None or not rooms.one_way:
+        if built is None or (rooms := built.room_labels) is None or not rooms.one_way:
             return None
         from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
 

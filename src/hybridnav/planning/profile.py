@@ -170,7 +170,7 @@ def under_profile(
     by costs, also where each metre counts one: floors of a building plan by one method. Where the
     preset knows lengths only, the cells of the whole map are searched.
     """
-    grid, rooms = topology.grid, topology.pyramid.rooms
+    grid, rooms = topology.grid, topology.room_labels
     if profile.width_m is not None:
         radius_m = max(profile.width_m / 2 - _ROUNDING_M, 0.0)
         grid = replace(grid, robot_radius_m=radius_m, radius_is_default=False)
@@ -199,7 +199,7 @@ class ProfiledFloor:
     def of(cls, topology: TopologicalMap, profile: Profile, settings: PlannerSettings) -> Self:
         """Return that of a map for the width of a profile. A disc passes some doors that are less
         than a cell narrower than it: these are closed."""
-        rooms, narrow = topology.pyramid.rooms, list[int]()
+        rooms, narrow = topology.room_labels, list[int]()
         if rooms is not None and profile.width_m is not None:
             least_m = profile.width_m - _ROUNDING_M
             doors = [door for door in topology.rooms.listed_doors if door.passable]

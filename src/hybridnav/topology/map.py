@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
+    from hybridnav.maps import RoomLabels
     from hybridnav.pyramid.record import Linkage, Patch
     from hybridnav.rooms.level import Rooms
     from hybridnav.topology.inclusion import Enclosed, Inclusion
@@ -188,6 +189,12 @@ class TopologicalMap:
     def has_rooms(self) -> bool:
         """Whether the pyramid was built with rooms."""
         return getattr(self.source, "rooms", None) is not None
+
+    @property
+    def room_labels(self) -> RoomLabels | None:
+        """The rooms that the pyramid was built with, None without; a version is not made dense to
+        look."""
+        return self.pyramid.rooms if self.has_rooms else None
 
     @cached_property
     def rooms(self) -> Rooms:

@@ -232,7 +232,7 @@ def _draw_ground(
     Return the entries of the legend, and the labels that were placed.
     """
     grid = topology.grid
-    if topology.pyramid.rooms is None:
+    if not topology.has_rooms:
         places = Places(topology.level)
         draw_cells(canvas, grid, topology.level.field_of, places.colours(~places.free))
         entry: Entry = (swatch(style.PLACES, style.PALE), "places")

@@ -232,7 +232,7 @@ class _OverFloors:
     ) -> Session:
         """Return the session of the floors of one map, whose planner keeps what it has prepared."""
         model, topology = Model(planner.grid), planner.topology
-        if topology.pyramid.rooms is None:
+        if not topology.has_rooms:
             topology = model.grown(planner.preset.pyramid, find_rooms(model.grid))
         file = (files or {}).get(names[0])
         session = Session(model, topology, planner.preset, costs=planner.costs, file=file)

@@ -209,7 +209,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
         )
     if not 0 < tolerance_m < math.inf:
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
-    rooms = topology.rooms if topology.pyramid.rooms is not None else None
+    rooms = topology.rooms if topology.has_rooms else None
     passed = {number for numbers in graph.edge_doors for number in numbers}
     listed = () if rooms is None else rooms.listed_doors
     doors = [door for door in listed if door.number in passed]

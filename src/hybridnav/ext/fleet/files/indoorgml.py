@@ -147,7 +147,7 @@ def _model_of(name: str, floors: dict[str, TopologicalMap], split: list[str]) ->
     contains: list[tuple[str, str, str]] = []
     for number, (floor, topology) in enumerate(floors.items()):
         _add_places(layers["places"], topology, number, floor)
-        if topology.pyramid.rooms is not None:
+        if topology.has_rooms:
             rooms = layers.setdefault("rooms", nx.MultiGraph(boundaries={}))
             contains += _add_rooms(rooms, layers["places"], topology, (number, floor), split)
     return IndoorModel(name, layers, tuple(contains))
