@@ -219,12 +219,17 @@ def named_spec(
 
 def recorded_spec(method: NamedMethod) -> MethodSpec:
     """Return the method of the paths that a folder has; see `RecordedMethod`."""
-    settings = {"folder": str(Path(method.source).resolve()), **method.settings}
-    if unknown := sorted(method.settings.keys() - {"unit", "frame"}):
-        raise InvalidValueError(f"recorded paths have the settings unit and frame, got {unknown}")
+    settings = recorded_settings(method)
     name = method.name or f"recorded {Path(method.source).stem}"
     source = content_of(settings["folder"])
     return MethodSpec(name, None, factory=RECORDED, settings=settings, source=source)
+
+
+def recorded_settings(method: NamedMethod) -> dict[str, Any]:
+    """Return the keyword arguments of `RecordedMethod`."""
+    if unknown := sorted(method.settings.keys() - {"unit", "frame"}):
+        raise InvalidValueError(f"recorded paths have the settings unit and frame, got {unknown}")
+    return {"folder": str(Path(method.source).resolve()), **method.settings}
 
 
 def graph_spec(given: Any, *, clear_edges_only: bool = False) -> MethodSpec:
@@ -252,6 +257,8 @@ class Prepared:
     """Whether it plans by the costs of the run."""
     label: str = ""
     """Name that a class of others gives itself, empty for other methods."""
+    is_recorded: bool = False
+    """Whether its answers were recorded: times would be those of looking them up."""
 
     def ask(self, start: tuple[int, int], goal: tuple[int, int]) -> Callable[[], MethodResult]:
         """Ask the method for a path; return what tells the answer whole.
@@ -295,7 +302,7 @@ def prepare(spec: MethodSpec, grid: OccupancyGrid, costs: CostLayer | None = Non
     by_costs = costs is not None
     seconds = built - began, clock() - built
     label = spec.label and (own_name(method) or spec.label)
-    return Prepared(method, topology, *seconds, by_costs, label)
+    return Prepared(method, topology, *seconds, by_costs, label, spec.is_recorded)
 
 
 def _of_class(

@@ -111,7 +111,11 @@ def source_hash(path: str) -> str:
     files = _files_of(sys.modules.get(path.partition(":")[0]))
     if not files:
         return ""
-    # By content alone: a clone elsewhere has the same hash.
+    return content_hash(files)
+
+
+def content_hash(files: Iterable[Path]) -> str:
+    """Return a short hash of files, by content alone: a clone elsewhere has the same hash."""
     parts = sorted(hashlib.sha256(file.read_bytes()).hexdigest() for file in files)
     whole = parts[0] if len(parts) == 1 else hashlib.sha256("".join(parts).encode()).hexdigest()
     return whole[:_HASH_DIGITS]

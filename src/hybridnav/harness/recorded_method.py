@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +11,7 @@ from hybridnav._base.files import printable
 from hybridnav._base.trig import hypots
 from hybridnav.errors import MapError, MapNotFoundError
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
+from hybridnav.harness.names import content_hash
 from hybridnav.harness.path_files import Unit, load_paths
 from hybridnav.maps import OccupancyGrid
 
@@ -21,7 +19,6 @@ Cell = tuple[int, int]
 
 NOT_RECORDED = "not recorded"
 """Status of a pair of which no path was recorded."""
-_HASH_DIGITS = 12
 
 
 class RecordedMethod:
@@ -37,7 +34,6 @@ class RecordedMethod:
 
     region_of = None
     n_edges = 0
-    is_recorded = True
 
     def __init__(
         self, grid: OccupancyGrid, folder: str, unit: Unit | None = None, frame: str | None = None
@@ -92,15 +88,5 @@ def files_of(folder: str) -> tuple[Path, ...]:
 
 def content_of(folder: str) -> str:
     """Return a short hash of the files: paths that were recorded again are another method."""
-    return _hash_of(tuple((str(each), each.stat().st_mtime_ns) for each in _all_of(folder)))
-
-
-@lru_cache(maxsize=16)
-def _hash_of(files: tuple[tuple[str, int], ...]) -> str:
-    each = (hashlib.sha256(Path(name).read_bytes()).hexdigest() for name, _ in files)
-    return hashlib.sha256("".join(each).encode()).hexdigest()[:_HASH_DIGITS]
-
-
-def _all_of(folder: str) -> Iterator[Path]:
-    for each in files_of(folder):
-        yield from sorted(each.rglob("*")) if each.is_dir() else (each,)
+    each = [one.rglob("*") if one.is_dir() else [one] for one in files_of(folder)]
+    return content_hash(file for some in each for file in some if file.is_file())

@@ -25,7 +25,7 @@ from hybridnav.harness.methods import (
     graph_spec,
     named_spec,
     preset_spec,
-    recorded_spec,
+    recorded_settings,
 )
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.recorded_method import RecordedMethod
@@ -397,7 +397,7 @@ def _recorded_pairs(
     settings: RunSettings, recorded: Sequence[NamedMethod], grid: OccupancyGrid
 ) -> list[Pair]:
     """Return the pairs of which paths were recorded, those between free cells."""
-    made = [RecordedMethod(grid, **recorded_spec(named).settings) for named in recorded]
+    made = [RecordedMethod(grid, **recorded_settings(named)) for named in recorded]
     ends = dict.fromkeys(pair for method in made for pair in method.pairs)
     free = grid.classes == CellClass.FREE
     inside = [ends for ends in ends if all(_holds(free, cell) for cell in ends)]

@@ -149,7 +149,7 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
         **({"version": str(version)} if (version := getattr(method, "version", "")) else {}),
         **({"settings_text": words} if (words := own_settings(method)) else {}),
         **({"by_costs": True} if prepared.by_costs else {}),
-        **({} if _is_recorded(prepared) else _times_of(prepared)),
+        **_times_of(prepared),
         "n_nodes": int(method.n_nodes),
         "n_edges": int(method.n_edges),
         "memory_bytes": int(method.memory_bytes),
@@ -159,12 +159,10 @@ def _of_preparation(prepared: Prepared, judge: Judge) -> Record:
     }
 
 
-def _is_recorded(prepared: Prepared) -> bool:
-    """Return whether the times would be those of looking paths up."""
-    return bool(getattr(prepared.method, "is_recorded", False))
-
-
 def _times_of(prepared: Prepared) -> Record:
+    """Return the seconds of the preparation, none for recorded answers."""
+    if prepared.is_recorded:
+        return {}
     return {
         "pyramid_seconds": prepared.pyramid_seconds,
         "method_seconds": prepared.method_seconds,
@@ -279,7 +277,7 @@ def _answer(prepared: Prepared, judge: Judge, pair: Pair) -> Record:
     began = clock()
     try:
         tell = prepared.ask(pair.start, pair.goal)
-        seconds = None if _is_recorded(prepared) else clock() - began
+        seconds = None if prepared.is_recorded else clock() - began
         answer = tell()
     except Exception as error:  # noqa: BLE001 - a failing method is a result
         return {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 import threading
+from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterable, Sequence
 from pathlib import Path
@@ -30,7 +31,7 @@ _PASSED = 16
 """Rooms that a route lists."""
 
 
-class _Answers:
+class _Answers(ABC):
     """What answers about a map and about a building share.
 
     `known`: all functions; `kinds`: of things that can be closed.
@@ -64,8 +65,9 @@ class _Answers:
         with self._lock:
             return ask.answer_of(functions, name, arguments, allow_edits=self.allow_edits)
 
+    @abstractmethod
     def _named(self, asked: Any) -> list[places.Thing]:
-        raise NotImplementedError
+        """Return the doors, rooms and links that a question names."""
 
     def _close(self, asked: Any) -> dict[str, Any]:
         return self._changes.close(self._named(asked))
