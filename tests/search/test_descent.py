@@ -24,6 +24,7 @@ from hybridnav.search.descent import (
     sizes_of,
 )
 from hybridnav.search.grid_search import GridSearch
+from hybridnav.search.kernels import descent as kernels
 from hybridnav.search.lowest import lowest_of
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.strategies import examples, free_cells, scenes
@@ -342,3 +343,41 @@ def test_closed_cells_widen_the_search_step_by_step(
         return
     assert_legal(result.path.cells, left)
     assert recounted(result.path.cells) <= optimum * (1 if "whole" in stages else 1.1) + 1e-9
+
+
+class _FilledNumpy:
+    """numpy whose empty arrays hold one number, as memory that was used before may."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(np, name)
+
+    def empty(self, shape: Any, dtype: Any = float) -> Any:
+        return np.full(shape, self._number, dtype)
+
+
+def test_a_window_that_ends_where_it_begins_adds_no_cell(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Closed cells led a window back to the cell in hand; what memory held before became a cell."""
+    for name, value in {"MANY_PLACES": 0, "MOST_AT_TOP": 10, "MOST_BLOCKS": 2}.items():
+        monkeypatch.setattr(f"hybridnav.search.descent.{name}", value)
+    occupied = np.zeros((30, 5))
+    occupied[[0, 4, 26, 29], [4, 0, 0, 0]] = occupied[23:25, :4] = 1
+    grid = hn.OccupancyGrid(occupied, hn.Frame(0.1), robot_radius_m=0)
+    how = DescentSettings(field_cells=4, step=1.0, ring=2, horizon_cells=1)
+    pyramid = hn.DualGraphPyramid.build(grid, merge_distance_m=0.8)
+    descent = Descent(pyramid, grid.enterable(), how)
+    closed = [9, 13, 16, 21, 22, 28, 29, 35, 39, 42, 48, 55, 57, 68, 72, 75, 80, 86, 88, 97, 98]
+    closed += [100, 103, 104, 105, 112, 125, 126, 135, 144]
+    left = grid.enterable().copy()
+    left.ravel()[closed] = False
+    assert math.isinf(distances(move_graph(left), left.shape, (6, 1))[3, 3])
+    ends, shut = ((6, 1), (3, 3)), np.array(closed)
+    assert descent.find(*ends, closed=shut).cells is None  # compiled
+    for name, kernel in list(vars(kernels).items()):
+        if getattr(kernel, "__module__", "") == kernels.__name__:
+            monkeypatch.setattr(kernels, name, getattr(kernel, "py_func", kernel))
+    beyond = 4 * grid.shape[1] + 3  # between the start and the goal, past two closed corners
+    monkeypatch.setattr(kernels, "np", _FilledNumpy(beyond))
+    assert descent.find(*ends, closed=shut).cells is None

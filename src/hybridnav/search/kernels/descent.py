@@ -368,7 +368,8 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
             size = part.size - 1
             path = _with_room(path, n_path, size)
             path[n_path : n_path + size] = part[1:]
-        n_path += size if target == goal else max(size * 4 // 5, 1)
+        # None where closed cells led the choice back to the cell in hand.
+        n_path += size if target == goal else min(max(size * 4 // 5, 1), size)
         cell = np.int64(path[n_path - 1])
         # The route's field that lies as far on; one at least, so that windows end.
         at -= 1
