@@ -362,7 +362,7 @@ def test_a_window_that_ends_where_it_begins_adds_no_cell(monkeypatch: pytest.Mon
     """Closed cells led a window back to the cell in hand; what memory held before became a cell."""
     for name, value in {"MANY_PLACES": 0, "MOST_AT_TOP": 10, "MOST_BLOCKS": 2}.items():
         monkeypatch.setattr(f"hybridnav.search.descent.{name}", value)
-    occupied = np.zeros((30, 5))
+    occupied = np.zeros((30, 5), np.float32)
     occupied[[0, 4, 26, 29], [4, 0, 0, 0]] = occupied[23:25, :4] = 1
     grid = hn.OccupancyGrid(occupied, hn.Frame(0.1), robot_radius_m=0)
     how = DescentSettings(field_cells=4, step=1.0, ring=2, horizon_cells=1)

@@ -115,6 +115,12 @@ def checked_smooth(smooth: Smooth, *, has_arcs: bool) -> Smooth:
     return smooth
 
 
+def _line_of(cells: LongArray, points: FloatArray) -> Path:
+    """Return the path of lines through points, one point if it goes nowhere."""
+    length_m = polyline_length(points)
+    return Path(cells, points if length_m > 0 else points[:1], length_m)
+
+
 @copies_alike
 class AsFound:
     """Paths by lengths stay as the method found them."""
@@ -147,9 +153,7 @@ class InSight:
         began = clock()
         points = shorten(self._sight, query.closed, found.cells, query.points)
         found.stats.seconds["smooth"] = clock() - began
-        length_m = polyline_length(points)
-        path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
-        return Finished("any-angle", path, query.straight_m)
+        return Finished("any-angle", _line_of(found.cells, points), query.straight_m)
 
 
 @copies_alike
@@ -200,8 +204,7 @@ class LineByCosts:
             path, cost_m = self._costs.arcs(query, found.cells, points)
             found.stats.seconds["arcs"] = clock() - began
         else:
-            length_m, cost_m = polyline_length(points), found.cost_m
-            path = Path(found.cells, points if length_m > 0 else points[:1], length_m)
+            path, cost_m = _line_of(found.cells, points), found.cost_m
         bound = partial(self._costs.bound, query, cost_m)
         return Finished(self._metric, path, bound, cost_m, line=points)
 
@@ -220,13 +223,14 @@ class CostFinish:
         self._allow_unexplored = settings.allow_unexplored
         self._turning_radius_m: float = getattr(settings, "turning_radius_m", math.nan)
 
-    def line(self, query: Query, cells: LongArray) -> tuple[Path, float]:
-        """Return the any-angle path that a path of cells is cut short to, and its cost in
-        metres."""
-        points = shorten(self._line, query.closed, cells, query.points)
-        length_m = polyline_length(points)
-        cost_m = max(cost_along(self._grid, self.layer, points), length_m)
-        return Path(cells, points if length_m > 0 else points[:1], length_m), cost_m
+    def line(
+        self, query: Query, cells: LongArray, points: FloatArray | None = None
+    ) -> tuple[Path, float]:
+        """Return an any-angle path, and its cost in metres; `points`: as for `arcs`."""
+        if points is None:
+            points = shorten(self._line, query.closed, cells, query.points)
+        path = _line_of(cells, points)
+        return path, max(cost_along(self._grid, self.layer, points), path.length_m)
 
     def arcs(
         self, query: Query, cells: LongArray, points: FloatArray | None = None
@@ -243,9 +247,7 @@ class CostFinish:
             curve = line.on_grain(path.poses(_CHORD * self._grid.resolution_m)[:, :2])
             first, last = map(tuple, cells[[0, -1]].tolist())
             if wrong_at(closed.one_way, line.free, curve, (first, last)) is not None:
-                length_m = polyline_length(points)
-                cost_m = cost_along(self._grid, self.layer, points)
-                return Path(cells, points, length_m), max(cost_m, length_m)
+                return self.line(query, cells, points)
         return path, max(found.cost_m, found.length_m)
 
     def bound(self, query: Query, cost_m: float) -> float:

@@ -367,20 +367,20 @@ class Planning:
     ) -> PlanResult:
         """Return a result, which records endpoints, preset and settings of the pyramid."""
         metric, path, bound, cost, grid_bound, line, status, how = end
-        start, goal = query.poses
+        (start, goal), topology = query.poses, self.topology
         words: Source[tuple[Any, ...]] = ()
         if path is not None:
             if self.ompl is None and len(start) + len(goal) > 4:  # noqa: PLR2004 - two points
                 path = path.turned_at_ends(start, goal)
-            built, finder = self.built, self._route_finder
+            finder = self._route_finder
             is_derived = route is None or self.ompl is not None
-            if is_derived and built is not None and finder is not None:
-                route = partial(_route_along, built, finder, path)
+            if is_derived and topology is not None and finder is not None:
+                route = partial(_route_along, topology, finder, path)
             if status is PlanStatus.SOLVED:
                 if not callable(bound):
                     bound = min(bound, path.length_m if cost is None else cost)
-                if built is not None and self.has_rooms:
-                    words = Walk(path, built, query.goal_name or query.points[1], start)
+                if topology is not None and topology.has_rooms:
+                    words = Walk(path, topology, query.goal_name or query.points[1], start)
         return PlanResult(
             status=status,
             metric=metric,
@@ -396,7 +396,7 @@ class Planning:
             grid_bound=grid_bound,
             line=line,
             instructions_source=words,
-            ground=PlannedOn(self.grid, self.costs, query.closed, self.topology),
+            ground=PlannedOn(self.grid, self.costs, query.closed, topology),
         )
 
     @cached_property
@@ -419,11 +419,6 @@ class Planning:
             **({} if limits is None else {"limits": limits.model_dump()}),
             **costs,
         }
-
-    @cached_property
-    def has_rooms(self) -> bool:
-        """Whether the map has rooms, so that words tell of its paths."""
-        return self.topology is not None and self.topology.has_rooms
 
     def plan_many(
         self,

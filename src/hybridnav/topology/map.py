@@ -192,8 +192,7 @@ class TopologicalMap:
 
     @property
     def room_labels(self) -> RoomLabels | None:
-        """The rooms that the pyramid was built with, None without; a version is not made dense to
-        look."""
+        """The rooms that the pyramid was built with, None without; makes no version dense."""
         return self.pyramid.rooms if self.has_rooms else None
 
     @cached_property
