@@ -16,7 +16,7 @@ CHART, MAP = "beside-peers.svg", "bwi_gdc/3/3"
 _NAMES = {
     "shortest": "shortest",
     "octile": "octile",
-    "paper": "paper, one step",
+    "paper": "paper",
     "grid-astar": "A*",
     "weighted-astar": "weighted A*",
     "hpa-star": "HPA*",

@@ -18,7 +18,6 @@ from hybridnav.harness.columns import (
 from hybridnav.harness.methods import REFERENCE
 from hybridnav.harness.output import rows_of_methods
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW, YARDSTICKS
-from hybridnav.planning import load_preset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -76,7 +75,6 @@ def collect(folder: Path, root: Path, kinds: Mapping[str, str]) -> Data:
         "machine": _machine(studies.values()) | ({"ompl": ompl} if ompl else {}),
         "maps": _maps(studies.values(), kinds),
         "parts": {name: part_figures(study) for name, study in studies.items()},
-        "paper": load_preset("paper").planner.levels,
         **({"descent": json.loads(levels.read_text("utf-8"))} if levels.exists() else {}),
     }
 

@@ -245,8 +245,6 @@ def circumstances(data: Data) -> list[tuple[str, str]]:
     facts.append(("versions", ", ".join(versions)))
     if "planners of others" in machine:
         facts.append(("planners of others", machine["planners of others"]))
-    if data.get("paper") != "descent":
-        facts.append(("paper", "measured with `levels: places`, before it came down the levels"))
     minutes = sum(data["seconds"].values()) / 60
     facts.append(("time of the study", f"{minutes:.0f} minutes"))
     return facts
@@ -270,8 +268,6 @@ def in_short(data: Data) -> str:
     figures = quoted(data)
     lines = [f"* Contradictions: {figures['contradictions']} in {figures['checks']} answers.\n"]
     for template in _FINDINGS:
-        if "paper_work" in template and data.get("paper") != "descent":
-            continue
         try:
             lines.append(template.format_map(figures))
         except KeyError:
@@ -289,7 +285,7 @@ _FINDINGS = tuple(
     f"* {line}\n"
     for line in (
         (
-            "Our reading of the source paper (`paper`) is {paper_octile} % longer than the octile "
+            "`paper` is {paper_octile} % longer than the octile "
             "optimum in the mean and {paper_any} % longer than the any-angle optimum. The octile "
             "optimum itself is {grid_any} % longer."
         ),

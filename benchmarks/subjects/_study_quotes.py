@@ -155,7 +155,7 @@ _SOBERING = "{paper_octile} % longer than the octile optimum in the mean "
 
 QUOTES = (
     Quote("README.md", "[{maps} public maps](docs/study.md) {contradictions} of {checks} answers"),
-    Quote("README.md", "(`paper`, one step) is {paper_any} % above the any-angle optimum"),
+    Quote("README.md", "`paper` is {paper_any} % above the any-angle optimum"),
     Quote("docs/peers.md", "implementation loses {hpa_octile} % in the mean"),
     Quote(
         "docs/peers.md",

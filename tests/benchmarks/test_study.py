@@ -222,8 +222,6 @@ def test_the_page_says_what_the_levels_of_a_descent_do(data):
     text = page(data | {"descent": levels})
     assert f"at the places {text_of(figures['places']['loss mean %'])} % in the mean" in text
     assert "study-descent.svg" not in page(data)
-    assert "measured with `levels: places`" in page({**data, "paper": "places"})
-    assert "measured with `levels: places`" not in text
 
 
 def test_a_contradiction_stands_on_the_page(data):
