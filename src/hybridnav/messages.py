@@ -6,13 +6,11 @@ import importlib
 import math
 import operator
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from hybridnav._base.trig import asin, atan2, cos, hypot, sin
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError, brief
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray
 
 _T = TypeVar("_T")
 

@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import threading
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +18,6 @@ from typing import TYPE_CHECKING
 from hybridnav.errors import MapError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     from typing_extensions import Self
 
     from hybridnav._base.typing import PathLike

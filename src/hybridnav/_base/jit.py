@@ -9,11 +9,12 @@ import re
 import sys
 import time
 import warnings
+from collections.abc import Callable
 from functools import cache, cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import llvmlite.binding as llvm
 import numba
@@ -32,9 +33,6 @@ from numba.extending import register_jitable
 
 from hybridnav._base.trig import IN_KERNELS
 from hybridnav.errors import CacheWarning
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Kernel = TypeVar("Kernel")
 

@@ -15,13 +15,12 @@ FDLIBM, Sun Microsystems 1993: the polynomials and the reduction of arguments.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import ArrayLike
 
     from hybridnav._base.typing import FloatArray

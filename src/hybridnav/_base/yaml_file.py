@@ -10,13 +10,12 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import yaml
 from yaml.composer import ComposerError
 from yaml.constructor import ConstructorError
+from yaml.nodes import MappingNode, Node
 
 from hybridnav._base.files import printable
 from hybridnav.errors import HybridNavError, brief
 
 if TYPE_CHECKING:
-    from yaml.nodes import MappingNode, Node
-
     from hybridnav._base.typing import PathLike
 
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
+import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError
 from hybridnav.errors import InvalidValueError, MapError
 
 if TYPE_CHECKING:
-    import hybridnav as hn
     from hybridnav.maps.costs.files import CostSpec
 
 T = TypeVar("T")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import typer
 
+import hybridnav as hn
 from hybridnav._base.extension import extension
 from hybridnav.cli import options
 from hybridnav.cli.common import UsageError, check_new, check_output, check_picture
@@ -19,7 +20,6 @@ from hybridnav.guide.words import check_language, languages
 from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
-    import hybridnav as hn
     from hybridnav.cli.rendering import Waypoint
     from hybridnav.planning.named import At
 

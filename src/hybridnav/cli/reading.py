@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import hybridnav as hn
@@ -10,9 +12,6 @@ from hybridnav.cli.common import UsageError, check_writable, stage
 from hybridnav.maps import MAX_CELLS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     from hybridnav.cli.options import Closing
     from hybridnav.planning import Preset
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -32,8 +33,6 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from hybridnav._base.typing import FloatArray
     from hybridnav.maps import RoomLabels
     from hybridnav.maps.room_labels import Point

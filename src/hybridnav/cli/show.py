@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,8 +27,6 @@ from hybridnav.cli.options import MapArgument, PlotOption, RegionsOption, option
 from hybridnav.cli.reading import grow_topology, read_preset
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav.search.descent import WatchedDescent
 
 LevelOption = Annotated[

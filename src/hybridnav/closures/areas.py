@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.rows import in_runs
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.maps.occupancy import extent
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import Frame, OccupancyGrid
     from hybridnav.pyramid import Level
 
 

@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.rows import in_runs
+from hybridnav._base.typing import LongArray
 from hybridnav.closures.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
 from hybridnav.closures.ids import arc_on, door_on, found_ids
 from hybridnav.closures.one_way import OneWay, OneWayLike, as_one_way, joined
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import LevelArc
 from hybridnav.rooms import Door
+from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import no_places
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.topology import TopologicalMap
 
 
 @copies_alike

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from hybridnav._base.typing import LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import LevelArc
-from hybridnav.rooms import Door
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import LongArray
-    from hybridnav.rooms import Rooms
-    from hybridnav.topology import TopologicalMap
+from hybridnav.rooms import Door, Rooms
+from hybridnav.topology import TopologicalMap
 
 
 def door_on(rooms: Rooms, door: int | Door) -> Door:

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridnav._base.files import printable, replace_file
 from hybridnav._base.yaml_file import Limits, read_marked
@@ -18,17 +18,16 @@ from hybridnav.closures.blocked import Blocked
 from hybridnav.closures.one_way import OneWay, directions_on
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.maps import OneWayRule
+from hybridnav.topology import TopologicalMap
 
 try:
     import fcntl
 except ImportError:  # on Windows two that write at once are not kept apart
     fcntl = None  # type: ignore[assignment]
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
-    from hybridnav._base.typing import PathLike
-    from hybridnav.topology import TopologicalMap
+from hybridnav._base.typing import PathLike
 
 _ENDING = ".closed.yaml"
 _WHAT = re.compile(

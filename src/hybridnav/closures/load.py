@@ -6,29 +6,25 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import BoolArray, PathLike
 from hybridnav._base.yaml_file import Limits, open_file
 from hybridnav.closures.areas import parts_on
 from hybridnav.closures.blocked import Blocked
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs.files import load_keepout_mask
 from hybridnav.maps.files.image import read_raster
 from hybridnav.maps.files.ros import occupancy_of_greys
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import BoolArray, PathLike
-    from hybridnav.maps import OccupancyGrid
 
 LIMITS = Limits(max_bytes=2**22, max_values=100_000)
 """Most bytes of a GeoJSON file, and most values in it."""

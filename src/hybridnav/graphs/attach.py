@@ -10,15 +10,15 @@ import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.graphs.kernels import routes
+from hybridnav.maps import OccupancyGrid
+from hybridnav.refine import Sight
 
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.graphs.waypoint_graph import WaypointGraph
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.refine import Sight
 
 _CANDIDATES = 100
 """Nearest nodes of a point that are tested for sight."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
@@ -12,15 +13,13 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.graphs.gather import Finding, Findings, Gathered, edge_text, point_of, shown
+from hybridnav.maps import OccupancyGrid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import networkx as nx
 
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
 
 Name = int | str
 

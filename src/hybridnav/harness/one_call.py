@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError, renamed
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.planning import Preset, preset_names
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from hybridnav._base.typing import PathLike
 
 Method = str | Preset | NamedMethod | type
 """What `evaluate` takes for a method."""

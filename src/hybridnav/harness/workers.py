@@ -6,6 +6,7 @@ import asyncio
 import multiprocessing
 import signal
 import time
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -13,17 +14,14 @@ from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.planning.endpoints import read_points
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.records import Record
     from hybridnav.harness.task import Task
     from hybridnav.harness.timing import TimingTask

@@ -8,21 +8,19 @@ of cells is `(first row, last row + 1, first column, last column + 1)`, as slice
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from shapely.geometry.base import BaseGeometry
 
+from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps.frame import Frame
+from hybridnav.maps.occupancy import OccupancyGrid
 
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
+Box = tuple[int, int, int, int]
 
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.maps.frame import Frame
-    from hybridnav.maps.occupancy import OccupancyGrid
-
-    Box = tuple[int, int, int, int]
 
 _ROUNDING_CELLS = 1e-6
 

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError, brief
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
 
 _T = TypeVar("_T")
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.trig import hypot
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray
 
 FEW_ROWS = 64
 """Radius in cells up to which rows are shifted one by one: for more of them scipy is quicker."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import cos, sin
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray, LongArray
 
 _LARGEST_M = 1e150
 """Coordinates beyond are taken for this one, so that no product of them overflows."""

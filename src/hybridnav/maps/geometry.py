@@ -4,10 +4,9 @@ numpy is slower.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.maps.kernels import (
     centres,
     classes_at,
@@ -20,9 +19,6 @@ from hybridnav.maps.kernels import (
     position_of,
     walks_clear,
 )
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 __all__ = [
     "cells_of_line",

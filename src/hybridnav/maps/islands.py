@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.maps.cells import CellClass
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-
 
 _ROUNDING = 1e-9
 """Relative slack on an area, so that 1 m² is 400 cells of 0.05 m and not 400.00001."""

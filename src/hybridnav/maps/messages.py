@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hybridnav._base.typing import ByteArray, SignArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import MAX_CELLS, CellClass
 from hybridnav.maps.frame import Frame
 from hybridnav.messages import count_of, header_message, number_of, pose_message, pose_of, value_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import ByteArray, SignArray
-
 
 _UNKNOWN, _FULL = -1, 100
 

@@ -5,12 +5,9 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from hybridnav.errors import InvalidValueError, brief
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 MAX_NAME = 80
 """Characters of a name at most."""

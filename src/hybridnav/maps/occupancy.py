@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import BoolArray, ByteArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M, MAX_CELLS, CellClass
 from hybridnav.maps.checks import checked_radius, checked_thresholds
@@ -16,11 +18,6 @@ from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.islands import DroppedIslands, without_islands
 from hybridnav.maps.messages import grid_message, percentages, read_probability
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, ByteArray
 
 
 class _RobotRadius:

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError, brief
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _RULE = re.compile(r"door:(?P<door>[1-9][0-9]{0,8})=(?P<into>.*)|line:(?P<line>[^:]+(?::[^:]+)+)")
 

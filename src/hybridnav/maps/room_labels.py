@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import IntArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.names import check_names, check_number, did_you_mean
+from hybridnav.maps.occupancy import OccupancyGrid
 from hybridnav.maps.one_way import OneWayRule
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from hybridnav._base.typing import IntArray
-    from hybridnav.maps.occupancy import OccupancyGrid
-
 
 MAX_ROOMS = 10_000
 """Most rooms of a map."""

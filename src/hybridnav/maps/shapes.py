@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike, NDArray
+from shapely.geometry.base import BaseGeometry
 
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.cells import MAX_CELLS
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.occupancy import OccupancyGrid
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike, NDArray
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 _ROUNDING = 1e-9
 """Part of a cell's side up to which a shape may lie beyond a side and count as ending on it."""

@@ -4,17 +4,15 @@ Public: `Bottleneck`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from hybridnav._base.typing import BoolArray
 from hybridnav.maps.cells import CellClass
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.kernels import joined_in_order
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.maps.occupancy import OccupancyGrid
+from hybridnav.maps.occupancy import OccupancyGrid
 
 Cell = tuple[int, int]
 

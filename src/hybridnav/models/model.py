@@ -156,9 +156,8 @@ class Model:
         InvalidValueError
             When the map does not suit the preset.
         """
-        # Loads numba, which a grid alone does not need.
+        # Compiles kernels, which a grid alone does not need.
         from hybridnav.models.searches import made_for, search_of  # noqa: PLC0415
-        from hybridnav.planning import HybridPlanner  # noqa: PLC0415
 
         preset = self._own_preset if preset is None else load_preset(preset)
         topology = self.topology if topology is None else topology

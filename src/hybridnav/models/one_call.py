@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from numpy.typing import ArrayLike
+
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import OccupancyGrid
+from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.models.model import Model, load
-from hybridnav.planning import Preset, load_preset
+from hybridnav.planning import PlanResult, Preset, load_preset
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.maps import RoomLabels
-    from hybridnav.planning import PlanResult
 
 ROOMS_FILE = "rooms.yaml"
 """Name of the file of rooms beside a map."""

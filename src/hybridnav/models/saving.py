@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 from hybridnav._base.files import MODEL_SUFFIX, printable
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError, ModelError
 from hybridnav.maps import OccupancyGrid
 from hybridnav.models import parts
-from hybridnav.models.container import write_parts
+from hybridnav.models.container import Part, write_parts
 from hybridnav.models.model import Model, is_model
+from hybridnav.planning import HybridPlanner
 from hybridnav.topology import TopologicalMap
 
 
@@ -26,14 +28,7 @@ class OfFloors(Protocol):
         ...
 
 
-if TYPE_CHECKING:
-    from hybridnav._base.typing import PathLike
-    from hybridnav.models.container import Part
-    from hybridnav.planning import HybridPlanner
-
-    Saved = (
-        OccupancyGrid | TopologicalMap | HybridPlanner | Model | OfFloors | Iterable[HybridPlanner]
-    )
+Saved = OccupancyGrid | TopologicalMap | HybridPlanner | Model | OfFloors | Iterable[HybridPlanner]
 
 
 def save(thing: Saved, path: PathLike, *, compress: bool = False) -> None:
@@ -91,8 +86,6 @@ def parts_of(
         return [parts.grid_part(thing)]
     if isinstance(thing, TopologicalMap):
         return _parts_of_map(thing)
-    from hybridnav.planning import HybridPlanner  # noqa: PLC0415 - loads numba
-
     several = list(thing) if isinstance(thing, Iterable) else []
     planners = [thing] if isinstance(thing, HybridPlanner) else several
     if not planners or not all(isinstance(planner, HybridPlanner) for planner in planners):

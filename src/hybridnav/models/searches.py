@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -22,10 +22,8 @@ from hybridnav.models.structures import (
 from hybridnav.planning import PlannerSettings
 from hybridnav.search import mesh as meshes
 from hybridnav.search import octile as jumps
-
-if TYPE_CHECKING:  # a plan of one preset loads no other
-    from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-    from hybridnav.search.octile import JumpSearch
+from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+from hybridnav.search.octile import JumpSearch
 
 _FRAME = 2
 """Rows and columns of the frame of blocked cells round a jump-point graph."""

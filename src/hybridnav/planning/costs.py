@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.areas import Box
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer
@@ -18,9 +21,6 @@ from hybridnav.maps.costs.factors import joined_cells
 from hybridnav.search.found import ClosedCells
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.areas import Box
     from hybridnav.planning import Preset
 
 

@@ -10,25 +10,22 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, get_args
 
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import Source, copies_alike
 from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.costs import cost_along
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.geometry import polyline_length
+from hybridnav.planning import PlannerSettings
 from hybridnav.planning.path import Path, path_of
 from hybridnav.planning.settings import Smooth
 from hybridnav.refine import LineOfSight
 from hybridnav.refine.one_way import shorten, wrong_at
-from hybridnav.search.found import PlanStatus
+from hybridnav.search.found import ClosedCells, Found, Metric, PlanStatus, Query
 
 if TYPE_CHECKING:
-    from hybridnav._base.copies import Source
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlannerSettings
     from hybridnav.refine import CostLine
-    from hybridnav.search.found import ClosedCells, Found, Metric, Query
 
 _CHORD = 0.25
 """Cells from one point of a curve to the next that is looked at for sides with a direction."""

@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.moves import path_length_in_cells
+from hybridnav._base.typing import LongArray
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planning.methods.cheapest import cells_passed
+from hybridnav.refine import CostLine
 from hybridnav.refine.one_way import obeys
-from hybridnav.search.found import Found
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.refine import CostLine
-    from hybridnav.search.found import Query
+from hybridnav.search.found import Found, Query
 
 
 def staying(grid: OccupancyGrid, line: CostLine, query: Query, found: Found) -> Found:

@@ -4,30 +4,25 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import atan2
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
+from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.names import did_you_mean
+from hybridnav.planning import PlannerSettings
 from hybridnav.planning.endpoints import check_at
+from hybridnav.search.directed import DirectedSides
+from hybridnav.search.found import ClosedCells
 from hybridnav.search.grid_search import GridSearch, cheapest_waypoints
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlannerSettings
-    from hybridnav.search.directed import DirectedSides
-    from hybridnav.search.found import ClosedCells
-    from hybridnav.topology import TopologicalMap
+from hybridnav.topology import TopologicalMap
 
 At = Literal["anywhere", "point"]
 """Position in a named room at which a path starts or ends."""

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import heapq
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
 from hybridnav._base.moves import STEPS
 from hybridnav._base.trig import hypot
+from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError, brief
+from hybridnav.maps import OccupancyGrid
+from hybridnav.search.directed import DirectedSides
+from hybridnav.search.found import ClosedCells
 from hybridnav.search.grid_search import costs_from, directed_moves
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.search.directed import DirectedSides
-    from hybridnav.search.found import ClosedCells
 
 _INSIDE = 1e-6
 """Cells that the point lies inside its cell, so that rounding takes it into no other."""

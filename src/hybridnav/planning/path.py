@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridnav._base.copies import copies_alike, frozen, made
+from hybridnav._base.copies import Source, copies_alike, frozen, made
 from hybridnav._base.poses import Motion
+from hybridnav._base.typing import FloatArray, LongArray, SignArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.messages import path_message
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from hybridnav._base.copies import Source
-    from hybridnav._base.typing import FloatArray, LongArray, SignArray
     from hybridnav.maps import Frame
     from hybridnav.planning.speed import MotionLimits, SpeedMap, SpeedProfile
     from hybridnav.search.found import Found

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
+from numpy.typing import ArrayLike
+from shapely.geometry.base import BaseGeometry
+
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Turns
+from hybridnav._base.typing import PathLike
+from hybridnav.closures.blocked import Closable
+from hybridnav.closures.one_way import OneWayLike
 from hybridnav.errors import InvalidValueError, renamed
-from hybridnav.maps import OccupancyGrid
+from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_area
-from hybridnav.planning import PlanStatus, Preset, load_preset
+from hybridnav.maps.costs import CostLayer
+from hybridnav.planning import PlanBatch, PlanResult, PlanStatus, Preset, load_preset
 from hybridnav.planning.costs import PlannerCosts
 from hybridnav.planning.endpoints import directed, read_points
 from hybridnav.planning.follow import PlannerUpdate, begun, opened, update_of
@@ -23,29 +32,15 @@ from hybridnav.planning.planning import Planning
 from hybridnav.planning.preset import check_radius
 from hybridnav.planning.questions import Questions, Unanswered
 from hybridnav.planning.result import plan_many
-from hybridnav.planning.settings import OmplPlannerSettings
+from hybridnav.planning.settings import OmplPlannerSettings, Smooth
+from hybridnav.search.found import ClosedCells, Method
 from hybridnav.topology import TopologicalMap
-from hybridnav.topology.map import no_places
+from hybridnav.topology.map import Version, no_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from contextlib import AbstractContextManager
-
-    from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.closures.one_way import OneWayLike
-    from hybridnav.maps import RoomLabels
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlanBatch, PlanResult
     from hybridnav.planning.named import At
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.planning.profile import Profile
-    from hybridnav.planning.settings import Smooth
-    from hybridnav.search.found import ClosedCells, Method
-    from hybridnav.topology.map import Version
 
 
 @copies_alike

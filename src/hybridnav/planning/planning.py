@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
@@ -11,40 +12,31 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import Source, copies_alike
+from hybridnav._base.typing import FloatArray
+from hybridnav.closures.blocked import Blocked, Closable
 from hybridnav.errors import InvalidValueError, MapWarning
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
-from hybridnav.planning import PlanResult
-from hybridnav.planning.endpoints import check_at, places_of_endpoints, read_ends, refusal
-from hybridnav.planning.finishes import Finished, checked_smooth, make_finish
+from hybridnav.planning import Path, PlanBatch, PlanResult, Preset
+from hybridnav.planning.costs import PlannerCosts
+from hybridnav.planning.endpoints import Ends, check_at, places_of_endpoints, read_ends, refusal
+from hybridnav.planning.finishes import Finish, Finished, checked_smooth, make_finish
 from hybridnav.planning.nearest import check_within, nearest_reachable, way_out
 from hybridnav.planning.result import PlannedOn, Walk, plan_many
-from hybridnav.route.route import RouteFinder, route_of_cells
-from hybridnav.search.found import ClosedCells, KeptLine, PlanStats, PlanStatus, Query
+from hybridnav.planning.settings import Smooth
+from hybridnav.route.route import Route, RouteFinder, route_of_cells
+from hybridnav.search.found import Cell, ClosedCells, KeptLine, Method, PlanStats, PlanStatus, Query
+from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import no_places
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.copies import Source
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.closures.blocked import Blocked, Closable
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning import Path, PlanBatch, Preset
-    from hybridnav.planning.costs import PlannerCosts
-    from hybridnav.planning.endpoints import Ends
-    from hybridnav.planning.finishes import Finish
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
-    from hybridnav.planning.settings import Smooth
     from hybridnav.refine import CostLine
-    from hybridnav.route.route import Route
-    from hybridnav.search.found import Cell, Method
-    from hybridnav.topology import TopologicalMap
 
 _KEEPING = ("cheapest", "shortest", "octile")
 """Methods whose paths may stay on earlier ones."""

@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hybridnav.closures.blocked import Blocked
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
+from hybridnav.closures.blocked import Blocked, Closable
 from hybridnav.maps import NO_ROOM, CellClass
 from hybridnav.maps.clearance import within_radius
-from hybridnav.planning.profile import ProfiledFloor, forbidden, in_the_way
+from hybridnav.planning.planning import Planning
+from hybridnav.planning.profile import Profile, ProfiledFloor, forbidden, in_the_way
+from hybridnav.planning.result import PlanResult
 from hybridnav.route import RouteFinder
 from hybridnav.route.visits import visits_of
 from hybridnav.search.found import ClosedCells
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.closures.blocked import Closable
-    from hybridnav.planning.planning import Planning
-    from hybridnav.planning.profile import Profile
-    from hybridnav.planning.result import PlanResult
 
 
 class PartGround(NamedTuple):

@@ -6,31 +6,26 @@ width. What is planned under it is proved for that problem.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from typing_extensions import Self
 
+from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, RoomUse
+from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.names import place_of_name
+from hybridnav.planning import PlannerSettings, Preset
+from hybridnav.planning.path import Path
 from hybridnav.planning.preset import planner_settings
 from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.rooms import Door
+from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from numpy.typing import ArrayLike
-    from typing_extensions import Self
-
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.maps import OccupancyGrid, RoomLabels
-    from hybridnav.planning import PlannerSettings, Preset
-    from hybridnav.planning.path import Path
-    from hybridnav.rooms import Door
-    from hybridnav.search.found import ClosedCells
 
 _MOST_ELSEWHERE, _MOST_M = 10.0, 100.0
 _ROUNDING_M = 1e-6

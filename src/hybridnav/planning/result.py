@@ -5,41 +5,36 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
+from typing_extensions import Self
 
-from hybridnav._base.copies import copies_alike, frozen, made, made_state
+from hybridnav._base.copies import Source, copies_alike, frozen, made, made_state
 from hybridnav._base.extension import in_html
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 from hybridnav.errors import PlanError, renamed
 from hybridnav.maps import CellClass
-from hybridnav.planning.path import check_length, is_length
+from hybridnav.planning.path import Path, check_length, is_length
 from hybridnav.planning.text import rounded_bound
-from hybridnav.search.found import ClosedCells, QueryMany
+from hybridnav.search.found import ClosedCells, FoundMany, Method, QueryMany
 from hybridnav.search.found import Metric as Metric  # noqa: PLC0414 - they are public here
 from hybridnav.search.found import PlanStats as PlanStats  # noqa: PLC0414
 from hybridnav.search.found import PlanStatus as PlanStatus  # noqa: PLC0414
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import ArrayLike
-    from typing_extensions import Self
-
-    from hybridnav._base.copies import Source
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
     from hybridnav.guide.words import Instruction
     from hybridnav.maps import OccupancyGrid
     from hybridnav.planning.costs import PlannerCosts
     from hybridnav.planning.finishes import Refinement
-    from hybridnav.planning.path import Path
     from hybridnav.planning.speed import MotionLimits
     from hybridnav.reasons import Explanation
     from hybridnav.route.route import Route
-    from hybridnav.search.found import FoundMany, Method
     from hybridnav.topology import TopologicalMap
 
 COST_METRICS: frozenset[Metric] = frozenset({"weighted", "any-angle-weighted"})

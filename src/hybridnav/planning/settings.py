@@ -18,12 +18,10 @@ from pydantic import (
     model_validator,
 )
 from pydantic_core import PydanticCustomError
+from typing_extensions import Self
 
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
 from hybridnav.refine.ompl.settings import OmplSettings
-
-if TYPE_CHECKING:
-    from typing_extensions import Self
 
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
-from hybridnav._base.poses import BEND, wrapped
+from hybridnav._base.poses import BEND, Spread, wrapped
 from hybridnav._base.trig import directions
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, SignArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.geometry import least_along
 from hybridnav.planning.settings import LimitSettings
-
-if TYPE_CHECKING:
-    from hybridnav._base.poses import Spread
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, SignArray
-
 
 _DEFAULTS = LimitSettings()
 

@@ -6,6 +6,7 @@ hot path.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
@@ -14,14 +15,11 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.rows import unique_rows
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass, OccupancyGrid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
     import networkx as nx
-
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 
 
 @copies_alike

@@ -13,7 +13,9 @@ import numpy as np
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import STRAIGHT, length_in_cells
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import CombinatorialMap
 from hybridnav.pyramid.cracks import boundaries_of, cell_pairs, endpoints_of, middles_of, sides_of
 from hybridnav.pyramid.graphs import (
@@ -24,16 +26,13 @@ from hybridnav.pyramid.graphs import (
     simple_graph,
     vertices_with_attributes,
 )
+from hybridnav.pyramid.islands import LazyIslands
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import hulls as _hull_kernels
 from hybridnav.pyramid.record import SURVIVES, Record
 
 if TYPE_CHECKING:
     import networkx as nx
-
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.pyramid.islands import LazyIslands
 
 
 @dataclass(frozen=True, order=True)

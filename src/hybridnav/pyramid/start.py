@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hybridnav._base.typing import AnyArray, ByteArray, IntArray, LongArray
 from hybridnav.pyramid.darts import Darts
 from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import throats as _throat_kernels
 from hybridnav.pyramid.kernels.decimation import Vertices
+from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.record import SURVIVES, Record
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]
 
-    from hybridnav._base.typing import AnyArray, ByteArray, IntArray, LongArray
-    from hybridnav.pyramid.level import Level
-
-    KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]
 
 N_CLASSES = 2
 """Classes of vertices: free and unexplored."""

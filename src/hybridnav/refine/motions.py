@@ -8,18 +8,17 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
+from typing_extensions import Self
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.refine.kernels import motions as kernels
 from hybridnav.refine.kernels.sweep import Body, look_ahead
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-    from typing_extensions import Self
-
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, LongArray
     from hybridnav.refine.footprint import Footprint
 
 _FARTHEST_CELLS = 5000

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+from hybridnav.maps import Frame
+from hybridnav.search.directed import DirectedSides
+from hybridnav.search.found import ClosedCells, Query
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+Cell = tuple[int, int]
+Span = tuple[int, ...]
+"""One or two rows, or columns."""
 
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import Frame
-    from hybridnav.search.directed import DirectedSides
-    from hybridnav.search.found import ClosedCells, Query
-
-    Cell = tuple[int, int]
-    Span = tuple[int, ...]
-    """One or two rows, or columns."""
 
 _UNIT = int(GRAIN)
 _PARTS = 8

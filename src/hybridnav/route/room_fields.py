@@ -8,13 +8,12 @@ import numpy as np
 
 from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import DIAGONAL, STRAIGHT
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.maps import CellClass
+from hybridnav.rooms import Rooms
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.rooms import Rooms
 
 
 class RoomFields:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from hybridnav._base.trig import lengths_along
+from hybridnav._base.typing import LongArray
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import LongArray
     from hybridnav.rooms import Door, Rooms
     from hybridnav.route.route import RouteFinder
 

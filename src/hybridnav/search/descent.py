@@ -10,31 +10,27 @@ at a time.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from copy import copy
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import STRAIGHT, legal_moves
 from hybridnav._base.threads import Pool
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.maps.costs.factors import UNIT_BITS
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid.record import Patch
 from hybridnav.route.route import Corridor
 from hybridnav.search.grid_search import UNLIMITED, move_tables
 from hybridnav.search.kernels import descent as _kernels
 from hybridnav.search.kernels import fields as _field_kernels
 from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
 from hybridnav.search.kernels.grid_search import BUCKETS, forbid
-from hybridnav.search.lowest import Layer, lowest_of, patched, patched_ends
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.pyramid.record import Patch
-    from hybridnav.search.lowest import Lowest
+from hybridnav.search.lowest import Layer, Lowest, lowest_of, patched, patched_ends
 
 T = TypeVar("T")
 Cell = tuple[int, int]

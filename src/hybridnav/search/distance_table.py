@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from hybridnav._base.moves import FAR, STRAIGHT, length_in_cells
 from hybridnav._base.threads import SHARES, cores
+from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.maps.costs import UNIT_BITS
 from hybridnav.search.kernels.labels import costs_to_cells, meet
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+Labels = tuple[LongArray, IntArray, LongArray]
+"""Offsets of ends, corners, costs."""
+Ends = tuple[LongArray, FloatArray]
+"""int64 (n, 2) free cells, and float64 (n, 2) points in them, (row, col) in grid units."""
 
-    from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
-
-    Labels = tuple[LongArray, IntArray, LongArray]
-    """Offsets of ends, corners, costs."""
-    Ends = tuple[LongArray, FloatArray]
-    """int64 (n, 2) free cells, and float64 (n, 2) points in them, (row, col) in grid units."""
 
 BLOCK = 1024
 """Ends whose labels are held at a time."""

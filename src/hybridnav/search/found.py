@@ -6,6 +6,7 @@ All lengths, costs and bounds are in metres, so that nobody has to know how a me
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -13,15 +14,12 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hybridnav._base.copies import made
+from hybridnav._base.copies import Source, made
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.copies import Source
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.areas import Box
     from hybridnav.maps.costs import CostLayer

@@ -10,12 +10,13 @@ pathfinding on grid maps, 2011), without jumps: N. R. Sturtevant and S. Rabin ca
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import (
@@ -28,19 +29,12 @@ from hybridnav._base.kernels.moves import (
     trace_cells,
 )
 from hybridnav._base.threads import Pool
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels import grid_search as _kernels
 from hybridnav.search.kernels import waypoints as _waypoint_kernels
-from hybridnav.search.watched import recorded
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.search.directed import DirectedSides
-    from hybridnav.search.watched import SearchRecord
+from hybridnav.search.watched import SearchRecord, recorded
 
 Cell = tuple[int, int]
 

@@ -3,19 +3,16 @@ them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.rows import unique_rows
-from hybridnav.pyramid.record import SURVIVES, farthest_apart
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+from hybridnav.pyramid import DualGraphPyramid
+from hybridnav.pyramid.level import Level
+from hybridnav.pyramid.record import SURVIVES, Patch, Record, farthest_apart
 from hybridnav.search.kernels import fields as _kernels
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.pyramid import DualGraphPyramid
-    from hybridnav.pyramid.level import Level
-    from hybridnav.pyramid.record import Patch, Record
 
 
 class Layer(NamedTuple):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import base64
 import math
 import zlib
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.moves import FAR
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.check_proof import (
     COS,
     LEVEL,
@@ -24,16 +25,6 @@ from hybridnav.check_proof import (
 from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
 from hybridnav.search.lattice import slopes_of
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import (
-        AnyArray,
-        BoolArray,
-        ByteArray,
-        FloatArray,
-        IntArray,
-        LongArray,
-    )
 
 
 class Grid(NamedTuple):

@@ -5,14 +5,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridnav._base.moves import DIAGONAL, STRAIGHT
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 TRACE_SUFFIX = ".trace.json"
 """Ending of the names of search traces of Posthoc."""

@@ -5,6 +5,7 @@ frame of its own (the source paper's section 2). Public: `Obstacle` and `Compone
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeGuard
@@ -12,18 +13,15 @@ from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TypeGuard
 import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.maps import CellClass, Frame, OccupancyGrid, RoomLabels
 from hybridnav.pyramid import DualGraphPyramid, Level
+from hybridnav.pyramid.record import Linkage, Patch
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import networkx as nx
 
-    from hybridnav._base.typing import ByteArray, FloatArray, IntArray, LongArray
-    from hybridnav.maps import RoomLabels
-    from hybridnav.pyramid.record import Linkage, Patch
     from hybridnav.rooms.level import Rooms
     from hybridnav.topology.inclusion import Enclosed, Inclusion
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 from weakref import WeakKeyDictionary
 
+from pydantic import BaseModel
+from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
@@ -14,14 +17,7 @@ from hybridnav.errors import HybridNavError
 from hybridnav.ext.agent.answers import MapAnswers
 from hybridnav.ext.agent.questions import INSTRUCTIONS, Answer, answered, schema_of, tools
 from hybridnav.ext.page.page import RETRY, PreparingError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from pydantic import BaseModel
-    from starlette.requests import Request
-
-    from hybridnav.ext.page.session import Session
+from hybridnav.ext.page.session import Session
 
 _UNPROCESSABLE, _NOT_YET = 422, 503
 _INSTRUCTIONS = INSTRUCTIONS.format(point="[x, y]")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -20,8 +21,6 @@ from hybridnav.ext.fleet.command import load_floors
 from hybridnav.ext.fleet.fleet_options import respond
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
     from hybridnav.ext.fleet import BuildingGraphCheck, BuildingGraphReport
     from hybridnav.graphs import Finding, GraphCheck
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -11,6 +13,7 @@ import typer
 import hybridnav as hn
 from hybridnav._base.files import printable
 from hybridnav.cli import common
+from hybridnav.cli.map_options import FloorOptions, MapOptions
 from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.query import PlanOptions, check_alternatives, checked_at, one_of
 from hybridnav.cli.reading import check_model, read_settings
@@ -20,11 +23,7 @@ from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planning.text import rounded_bound
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     from hybridnav.cli.build import BuildOptions
-    from hybridnav.cli.map_options import FloorOptions, MapOptions
     from hybridnav.ext.fleet import BuildingAlternatives
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,8 +18,6 @@ from hybridnav.ext.fleet import fleet_options as targets
 from hybridnav.ext.fleet.command import load_floors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from hybridnav.ext.fleet import Building
     from hybridnav.graphs import Excess, GraphReport, RouteGraph, WaypointGraph
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterable
 from importlib import resources
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from hybridnav._base.files import printable, replace_file
@@ -11,9 +13,6 @@ from hybridnav.cli.common import UsageError
 from hybridnav.cli.options import option
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from pathlib import Path
-
     from hybridnav.ext.fleet import BuildingGraphCheck, BuildingGraphReport
     from hybridnav.graphs import Finding, GraphCheck
 

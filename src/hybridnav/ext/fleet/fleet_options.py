@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav._base.typing import BoolArray
 from hybridnav.cli.common import UsageError, answer, complain, timings
 from hybridnav.cli.options import option
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from hybridnav._base.typing import BoolArray
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.graphs import GraphReport, RouteGraph
 

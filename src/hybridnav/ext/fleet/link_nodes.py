@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.links import Link
 from hybridnav.graphs.gather import free_name
@@ -19,11 +21,8 @@ from hybridnav.maps.checks import checked_type
 from hybridnav.maps.names import place_of_name
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import networkx as nx
 
-    from hybridnav._base.typing import FloatArray
     from hybridnav.graphs import WaypointGraph
 
 # Graphs of several floors, joined by links, as fleets and map editors exchange them.

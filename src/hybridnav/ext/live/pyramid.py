@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
+from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.typing import BoolArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.ext.live.identities import settle, shift_of
 from hybridnav.ext.live.state import CellDraft, State, check_stated, patch_of, pyramid_of, state_of
@@ -18,13 +20,7 @@ from hybridnav.maps.areas import box_of_area, class_reach, class_rules
 from hybridnav.maps.checks import checked_cell, checked_type
 from hybridnav.pyramid import DualGraphPyramid, Linkage
 from hybridnav.pyramid.decimation import Criterion, squared_limit
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav._base.typing import BoolArray, IntArray, LongArray
-    from hybridnav.pyramid.record import Patch
+from hybridnav.pyramid.record import Patch
 
 
 @copies_alike

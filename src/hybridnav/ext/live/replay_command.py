@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,6 +12,7 @@ import typer
 
 import hybridnav as hn
 from hybridnav._base.files import printable
+from hybridnav._base.progress import Progress
 from hybridnav.cli import common, options
 from hybridnav.cli.options import option
 from hybridnav.errors import MapError
@@ -18,9 +20,6 @@ from hybridnav.ext.live.map_command import open_log
 from hybridnav.maps import DEFAULT_MAX_CELLS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.progress import Progress
     from hybridnav.ext.live.mapping import Mapper
 
 _MAP_ENDINGS = {".yaml", ".yml"}

@@ -9,17 +9,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import cos, hypot, hypots, sin, sines_and_cosines
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges.kernels import cheapest_cost
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_cell, checked_points, checked_type
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
     from hybridnav.harness.judges.judge import Cell
     from hybridnav.maps import OccupancyGrid
     from hybridnav.maps.costs import CostLayer

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import dist, hypots
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import kernels
 from hybridnav.harness.judges.judge import (
@@ -25,9 +27,6 @@ from hybridnav.maps.checks import checked_points
 from hybridnav.maps.geometry import cells_of_line
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
     from hybridnav.maps import OccupancyGrid
 
 

@@ -7,23 +7,19 @@ from __future__ import annotations
 import math
 import operator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from hybridnav._base.copies import frozen
 from hybridnav._base.trig import exp
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.maps import CellClass
+from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.maps.areas import Box
 from hybridnav.maps.cells import MAX_CELLS
 from hybridnav.maps.clearance import FEW_ROWS, clearance_cells, squares_near
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
-    from hybridnav.maps import Frame, OccupancyGrid
-    from hybridnav.maps.areas import Box
 
 UNIT_BITS = 14
 """Factors are whole multiples of 2^-14."""

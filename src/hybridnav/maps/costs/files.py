@@ -6,30 +6,25 @@ and a filter mask.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from operator import or_
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError, MapWarning
-from hybridnav.maps import DEFAULT_MAX_CELLS
+from hybridnav.maps import DEFAULT_MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.costs.factors import SpeedLimits, checked_speeds, mask_on_map
 from hybridnav.maps.files.ros import read_mask
 from hybridnav.maps.messages import read_cells
 from hybridnav.maps.occupancy import extent
 from hybridnav.messages import number_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.maps import Frame, OccupancyGrid
 
 _KEYS = {
     "clearance": ("inflation_radius_m", "scaling", "inscribed_radius_m", "multiplier"),

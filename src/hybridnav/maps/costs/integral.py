@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.maps.costs.kernels import legal_cost, line_cost, segment_cost
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.maps import Frame, OccupancyGrid
-    from hybridnav.maps.costs.layer import CostLayer
+from hybridnav.maps.costs.layer import CostLayer
 
 __all__ = ["cost_along", "legal_cost", "segment_cost"]
 

@@ -6,12 +6,16 @@ import hashlib
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from hybridnav._base.copies import copies_alike, frozen
+from hybridnav._base.typing import AnyArray, BoolArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
+from hybridnav.maps import Frame, OccupancyGrid
+from hybridnav.maps.areas import Box
 from hybridnav.maps.checks import checked_cell, checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs.factors import (
@@ -35,13 +39,6 @@ from hybridnav.maps.costs.factors import (
     mask_on_map,
     rounded,
 )
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
-    from hybridnav._base.typing import AnyArray, BoolArray, LongArray
-    from hybridnav.maps import Frame, OccupancyGrid
-    from hybridnav.maps.areas import Box
 
 
 @copies_alike

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from hybridnav._base.extension import extension, extensions
 from hybridnav._base.files import printable
+from hybridnav._base.typing import PathLike
 from hybridnav.errors import MapError
 from hybridnav.maps import DEFAULT_MAX_CELLS, OccupancyGrid
 from hybridnav.maps.files.movingai import load_movingai_map
 from hybridnav.maps.files.ros import load_ros_map
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import PathLike
 
 _LOADERS = {".yaml": load_ros_map, ".yml": load_ros_map, ".map": load_movingai_map}
 _IMAGES = {".pgm", ".png", ".pnm", ".ppm", ".pbm", ".bmp", ".tif", ".tiff", ".gif", ".jpg", ".jpeg"}

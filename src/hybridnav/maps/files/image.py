@@ -7,25 +7,19 @@ import struct
 import threading
 import warnings
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, BinaryIO
+from typing import BinaryIO
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from numpy.typing import NDArray
+from PIL import Image, ImageFile, UnidentifiedImageError
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import BoolArray, ByteArray, PathLike
 from hybridnav._base.yaml_file import open_file
 from hybridnav.errors import MapError, MapNotFoundError
 from hybridnav.maps import MAX_CELLS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-    from PIL import ImageFile
-
-    from hybridnav._base.typing import BoolArray, ByteArray, PathLike
-
 
 _FORMATS = ("PNG", "PPM", "BMP", "TIFF", "GIF", "JPEG", "WEBP", "TGA", "PCX")
 """Raster formats; some of Pillow's others start programs (EPS) or hold whole documents."""

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import BinaryIO
 
 import numpy as np
 
 from hybridnav._base.files import NewFile, printable
-from hybridnav.errors import MapError
+from hybridnav._base.typing import ByteArray, PathLike
+from hybridnav._base.yaml_file import open_file
+from hybridnav.errors import MapError, MapNotFoundError
 from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray, PathLike
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, BinaryIO
-
-from hybridnav._base.yaml_file import open_file
-from hybridnav.errors import MapNotFoundError
 from hybridnav.maps.files.limits import check_max_cells, check_size
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray, PathLike
-
 
 _PASSABLE = b".GS"
 _BLOCKED = b"@OTW"

@@ -3,39 +3,26 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
-import yaml
-
-from hybridnav._base.files import printable, replace_file
-from hybridnav.errors import MapError
-from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, OccupancyGrid
-from hybridnav.maps.checks import checked_type
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray, PathLike
 import warnings
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from pathlib import Path, PurePath
+from typing import Any
 
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from hybridnav._base.files import printable, replace_file
+from hybridnav._base.typing import ByteArray, PathLike
 from hybridnav._base.yaml_file import read_yaml
-from hybridnav.errors import InvalidValueError, MapNotFoundError, MapWarning, brief
-from hybridnav.maps import Frame
+from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning, brief
+from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, Frame, OccupancyGrid
+from hybridnav.maps.checks import checked_type
 from hybridnav.maps.files.image import Raster, read_raster
 from hybridnav.maps.files.limits import check_max_cells, check_size
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import PathLike
-
 
 _MODES = ("trinary", "scale", "raw")
 _BOOLEANS = {"true": True, "yes": True, "on": True, "y": True, "1": True} | {

@@ -5,28 +5,25 @@ Public: `ShapeWorld`.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from hybridnav._base.files import printable
 from hybridnav._base.trig import cos, sin
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav._base.xml_reader import MOST_BYTES, XmlReader
 from hybridnav._base.yaml_file import read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+Pose = tuple[float, float, float, float]
+"""x, y, z in metres and the yaw in radians."""
 
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import FloatArray, PathLike
-
-    Pose = tuple[float, float, float, float]
-    """x, y, z in metres and the yaw in radians."""
 
 _UPRIGHT_RAD = 1e-6
 """Most roll and pitch of a shape that counts as upright: simulators save some of rounding."""

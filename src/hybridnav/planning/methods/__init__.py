@@ -6,10 +6,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from hybridnav.errors import InvalidValueError
+from hybridnav.planning import PlannerSettings
 from hybridnav.planning.settings import CheapestSettings
 
 if TYPE_CHECKING:
-    from hybridnav.planning import PlannerSettings
     from hybridnav.planning.methods.grid import KnownMap
     from hybridnav.search.found import Method
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,21 +11,18 @@ from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps.areas import Box
 from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.geometry import cells_of_line
 from hybridnav.planning.methods.grid import KnownMap
+from hybridnav.planning.settings import CheapestSettings
 from hybridnav.refine import CostLine
 from hybridnav.refine.one_way import obeys, shorten
-from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.search.found import ClosedCells, Found, MapChange, Method, Metric, PlanStats, Query
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.lattice import LatticeSearch, build_lattice
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.maps.areas import Box
-    from hybridnav.planning.settings import CheapestSettings
-    from hybridnav.search.found import ClosedCells, MapChange, Metric, Query
 
 _FEWER = 8
 """Landmarks of a lattice that was renewed, which is to be ready soon."""

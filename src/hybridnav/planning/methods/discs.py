@@ -9,23 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import BoolArray, LongArray
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.clearance import within_radius
-from hybridnav.maps.costs import cost_along
+from hybridnav.maps.costs import CostLayer, cost_along
+from hybridnav.planning import Path
 from hybridnav.planning.endpoints import refusal
 from hybridnav.planning.finishes import CostFinish
 from hybridnav.planning.methods.cheapest import OverLattice
 from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.methods.shortest import OverMesh
 from hybridnav.planning.settings import CheapestSettings, ShortestSettings
-from hybridnav.search.found import ClosedCells
+from hybridnav.search.found import ClosedCells, Found, Query
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, LongArray
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import Path
     from hybridnav.refine.footprint import Footprint
-    from hybridnav.search.found import Found, Query
 
     Disc = OverMesh | OverLattice
     """Finds paths of a disc."""

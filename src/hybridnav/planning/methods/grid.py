@@ -8,20 +8,18 @@ from typing import TYPE_CHECKING, NamedTuple
 from hybridnav._base.clock import clock
 from hybridnav._base.moves import octile_distance_in_cells
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav.maps import CellClass
+from hybridnav._base.typing import BoolArray, LongArray
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
+from hybridnav.planning import PlannerSettings
 from hybridnav.planning.methods.own_refiner import own_refiner
 from hybridnav.refine import GridRefiner
-from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.search.found import ClosedCells, Found, Method, Metric, PlanStats, Query
 from hybridnav.search.grid_search import directed_moves
+from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import PlannerSettings
     from hybridnav.search.distance_table import LabelSource
-    from hybridnav.search.found import ClosedCells, Metric, Query
-    from hybridnav.topology import TopologicalMap
 
 
 class KnownMap(NamedTuple):

@@ -11,15 +11,24 @@ from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import behind
+from hybridnav._base.typing import BoolArray
+from hybridnav.planning import PlannerSettings
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
-from hybridnav.search.found import Found, FoundMany, Method, PlanStats
+from hybridnav.search.found import (
+    ClosedCells,
+    Found,
+    FoundMany,
+    MapChange,
+    Method,
+    Metric,
+    PlanStats,
+    Query,
+    QueryMany,
+)
 from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray
-    from hybridnav.planning import PlannerSettings
     from hybridnav.search.distance_table import LabelSource
-    from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
 
 CONTRACTED_FROM = 2000

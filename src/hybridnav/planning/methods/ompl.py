@@ -6,41 +6,34 @@ import itertools
 import math
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.poses import Motion
 from hybridnav._base.trig import directions, dist
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
+from hybridnav.maps import OccupancyGrid
+from hybridnav.maps.costs import CostLayer
 from hybridnav.maps.geometry import cells_of_line, polyline_length
-from hybridnav.planning.finishes import Finished, Refinement
+from hybridnav.planning import Metric
+from hybridnav.planning.costs import PlannerCosts
+from hybridnav.planning.finishes import Answer, Finished, Refinement
 from hybridnav.planning.methods.discs import Discs
+from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.path import Path
+from hybridnav.planning.settings import OmplPlannerSettings
 from hybridnav.refine import LineOfSight, MotionCheck
 from hybridnav.refine.curves import Curve, Pose, driven, shortest_curve
-from hybridnav.refine.ompl import Corridors, OmplQuery, Setup, Worker
+from hybridnav.refine.ompl import Corridors, OmplQuery, Reply, Search, Setup, Worker
 from hybridnav.refine.one_way import led, obeys, shorten
 from hybridnav.search.found import ClosedCells, Found, Method, PlanStatus, Query
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
-    from hybridnav.planning import Metric
-    from hybridnav.planning.costs import PlannerCosts
-    from hybridnav.planning.finishes import Answer
-    from hybridnav.planning.methods.grid import KnownMap
-    from hybridnav.planning.settings import OmplPlannerSettings
-    from hybridnav.refine.ompl import Reply, Search
-
 
 NEAR_BOUND = 1.05
 """A path of the circumscribed disc that is at most this times the bound is the answer at once;

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,15 +15,12 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.trig import dist
 from hybridnav.errors import PresetError, brief
 from hybridnav.maps.geometry import polyline_length
+from hybridnav.planning import PlannerSettings
 from hybridnav.planning.methods.grid import KnownMap, round_closed
 from hybridnav.planning.methods.own_refiner import class_of, one_line, refused
 from hybridnav.planning.path import is_length
-from hybridnav.search.found import Found, Method
-
-if TYPE_CHECKING:
-    from hybridnav.planning import PlannerSettings
-    from hybridnav.refine import GridRefiner
-    from hybridnav.search.found import Query
+from hybridnav.refine import GridRefiner
+from hybridnav.search.found import Found, Method, Query
 
 
 def own_method(known: KnownMap, settings: PlannerSettings) -> Method:

@@ -5,19 +5,17 @@ from __future__ import annotations
 import inspect
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.moves import STEPS, legal_moves
+from hybridnav._base.typing import BoolArray, ByteArray, LongArray
 from hybridnav.errors import PresetError
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.planning import PlannerSettings
-    from hybridnav.refine import Refiner
-    from hybridnav.route import Corridor
+from hybridnav.maps import OccupancyGrid
+from hybridnav.planning import PlannerSettings
+from hybridnav.refine import Refiner
+from hybridnav.route import Corridor
 
 Cell = tuple[int, int]
 

@@ -8,30 +8,26 @@ pyramid to small fields, in which grid A* finds the path; or its places are the 
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from hybridnav import route as routes
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import copies_alike
+from hybridnav._base.copies import Source, copies_alike
 from hybridnav._base.moves import octile_distance_in_cells
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.typing import IntArray, LongArray
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, on_cells, round_closed
-from hybridnav.route.route import Route, route_of_places
+from hybridnav.planning.settings import PaperSettings
+from hybridnav.route.route import Corridor, Route, route_of_places
 from hybridnav.search.descent import Descent, DescentSettings
-from hybridnav.search.found import Found, Method, PlanStats
+from hybridnav.search.found import Found, MapChange, Method, Metric, PlanStats, Query
 from hybridnav.topology.map import is_version
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.copies import Source
-    from hybridnav._base.typing import IntArray, LongArray
-    from hybridnav.planning.settings import PaperSettings
     from hybridnav.route import MaxDistanceSearch
-    from hybridnav.route.route import Corridor
-    from hybridnav.search.found import MapChange, Metric, Query
 
 MOST_ROUND = 1.1
 """Times as long as the path without closed cells that one round them may be, if no search of the

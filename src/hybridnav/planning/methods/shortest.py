@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import warnings
+from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -15,11 +16,23 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.geometry import cells_of_line, line_between, polyline_length, polyline_lengths
 from hybridnav.planning.methods.grid import KnownMap, enterable_of
+from hybridnav.planning.settings import ShortestSettings
 from hybridnav.refine import LineOfSight
-from hybridnav.search.found import Found, FoundMany, Method, PlanStats
+from hybridnav.search.found import (
+    ClosedCells,
+    Found,
+    FoundMany,
+    MapChange,
+    Method,
+    Metric,
+    PlanStats,
+    Query,
+    QueryMany,
+)
 from hybridnav.search.mesh import (
     CornerHierarchy,
     DetourSearch,
@@ -33,12 +46,7 @@ from hybridnav.search.mesh import (
 from hybridnav.search.mesh.build import count_corners
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.planning.settings import ShortestSettings
     from hybridnav.search.distance_table import LabelSource
-    from hybridnav.search.found import ClosedCells, MapChange, Metric, Query, QueryMany
 
 
 _MOST_REMOVED, _FEW = 0.5, 1000

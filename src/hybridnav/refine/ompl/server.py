@@ -14,19 +14,22 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridnav.errors import HybridNavError
-from hybridnav.refine.ompl.client import SEARCH_S, Failure, ended, without_answer
+from hybridnav.refine.ompl.client import (
+    SEARCH_S,
+    Failure,
+    OmplQuery,
+    Reply,
+    Setup,
+    ended,
+    without_answer,
+)
 from hybridnav.refine.ompl.problem import Base
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridnav.refine.ompl.client import OmplQuery, Reply, Setup
 
 GRACE = 0.03
 """Share of the budget after its end at which a fork is killed."""

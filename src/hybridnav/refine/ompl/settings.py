@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
+from typing_extensions import Self
 
 if TYPE_CHECKING:
-    from typing_extensions import Self
-
     from hybridnav.refine.footprint import Footprint
 
 PARAMETERS: dict[str, dict[str, str]] = {

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.trig import dist, hypots
+from hybridnav._base.typing import AnyArray, FloatArray, LongArray
 from hybridnav.search.lattice.kernels import bound as kernels
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Any
+Position = tuple[float, float]
+Cell = tuple[int, int]
 
-    from hybridnav._base.typing import AnyArray, FloatArray, LongArray
-
-    Position = tuple[float, float]
-    Cell = tuple[int, int]
 
 _RATIO = math.sqrt(4 - 2 * math.sqrt(2))
 """Most by which a path over corners is dearer than one at any angle, 1.0824."""

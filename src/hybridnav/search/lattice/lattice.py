@@ -5,12 +5,13 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.threads import Pool, cores
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.search.lattice.kernels import queries as kernels
 from hybridnav.search.lattice.kernels.build import (
@@ -21,10 +22,6 @@ from hybridnav.search.lattice.kernels.build import (
     lay_edges,
     lay_nodes,
 )
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
-
 
 _SIDES = ((4, 0.35), (2, 0.5), (1, 4.0))
 """Cells on a side of a block, and the most walls beside a free cell, in the mean: where there are

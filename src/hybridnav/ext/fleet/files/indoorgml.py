@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +18,7 @@ import numpy as np
 
 from hybridnav._base.files import NewFile, printable
 from hybridnav._base.trig import dist
+from hybridnav._base.typing import LongArray, PathLike
 from hybridnav._base.yaml_file import read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.ext.fleet import Building, BuildingGraph, FloorGraph
@@ -26,15 +28,12 @@ from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.files.json_graphs import finite, json_errors
 from hybridnav.graphs.gather import Gathered, number_of, pair_of, shown
 from hybridnav.maps import CellClass
+from hybridnav.rooms import Door
 from hybridnav.topology import TopologicalMap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
     import networkx as nx
 
-    from hybridnav._base.typing import LongArray, PathLike
-    from hybridnav.rooms import Door
 
 Point = tuple[float, float]
 Line = list[Point]

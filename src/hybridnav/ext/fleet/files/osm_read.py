@@ -5,27 +5,30 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.trig import dist
 from hybridnav.errors import MapError
-from hybridnav.ext.fleet import BuildingGraph, DoorLine, FloorArea, FloorGraph, Link, LinkEnd
+from hybridnav.ext.fleet import (
+    BuildingGraph,
+    DoorLine,
+    FloorArea,
+    FloorGraph,
+    Link,
+    LinkEnd,
+    LinkKind,
+)
 from hybridnav.ext.fleet.files import osm_xml as osm
 from hybridnav.ext.fleet.files.osm_write import ALONE, ID, ID_BACK
 from hybridnav.ext.fleet.files.rmf_read import MOST_FLOORS, check_link_count, id_fact
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Findings, Gathered, free_name, number_of, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from shapely.geometry.base import BaseGeometry
-
-    from hybridnav.ext.fleet import LinkKind
 
 Point = tuple[float, float]
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav._base.trig import hypots
+from hybridnav._base.typing import PathLike
 from hybridnav.closures import Journal
 from hybridnav.errors import (
     HybridNavError,
@@ -24,7 +26,13 @@ from hybridnav.errors import (
 )
 from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
 from hybridnav.ext.fleet.checks import FloorParts, check_ends, check_reach
-from hybridnav.ext.fleet.files.entries import read_building_entries
+from hybridnav.ext.fleet.files.entries import (
+    EndEntry,
+    Entries,
+    FloorEntry,
+    LinkEntry,
+    read_building_entries,
+)
 from hybridnav.ext.fleet.floors import BuildingValues, Known
 from hybridnav.guide.words.landmarks import Landmarks
 from hybridnav.maps import DEFAULT_MAX_CELLS
@@ -39,12 +47,6 @@ from hybridnav.models.structures import BUILDING, FLOOR, refusal
 from hybridnav.planning import HybridPlanner, Preset, load_preset
 from hybridnav.rooms import Rooms, find_rooms
 from hybridnav.rooms.files.read import load_rooms
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import PathLike
-    from hybridnav.ext.fleet.files.entries import EndEntry, Entries, FloorEntry, LinkEntry
 
 
 def load_building(

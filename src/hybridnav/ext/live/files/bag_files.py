@@ -5,6 +5,7 @@ from __future__ import annotations
 import bz2
 import math
 from array import array
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache, cached_property
 from pathlib import Path
@@ -14,15 +15,13 @@ import numpy as np
 
 from hybridnav._base.files import printable
 from hybridnav._base.trig import acos, sin
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.errors import HybridNavError, MapError, MapNotFoundError, brief
 from hybridnav.messages import number_of, quaternion_of, stamp_ns_of, value_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator
-
     from rosbags.highlevel import AnyReader
 
-    from hybridnav._base.typing import FloatArray, PathLike
 
 GRID, LASER, ODOMETRY, PATH = (
     f"{package}/msg/{name}"

@@ -8,21 +8,17 @@ import math
 import zlib
 from abc import ABC, abstractmethod
 from collections import Counter
-from typing import TYPE_CHECKING, cast
+from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
+from typing_extensions import Buffer
 
 from hybridnav._base.files import printable
+from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav._base.yaml_file import open_file
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.ext.live.mapping import LaserScan, ScanSequence
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from typing_extensions import Buffer
-
-    from hybridnav._base.typing import FloatArray, PathLike
 
 _LONGEST_PAUSE_S = 600.0
 
