@@ -18,6 +18,13 @@ def test_plans_on_random_maps_are_legal_and_as_good_as_the_oracle_s(preset):
         assert scene is None or not list(faults(scene, preset)), seed
 
 
+def test_a_diagonal_beside_a_blocked_cell_goes_round_its_corner_by_the_other():
+    """The line along the side is legal, from a cell on its other hand; a list of cells was not."""
+    scene = random_scene(420)
+    assert scene is not None
+    assert list(faults(scene, "shortest")) == []
+
+
 def test_shortest_answers_many_pairs_and_tables_as_it_answers_each():
     scene = random_scene(24, n_ends=7)
     assert scene is not None

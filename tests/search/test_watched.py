@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
@@ -63,6 +63,7 @@ def test_astar_expands_what_any_astar_must_and_knows_its_cost(classes, seed):
 
 
 @pytest.mark.parametrize("contracted", [False, True])
+@example(np.array([[1, 0, 1, 1, 1, 1], [1, 1, 0, 1, 1, 1]], np.uint8), 0)  # corners, no arcs
 @given(classes=class_grids(), seed=seeds)
 @settings(max_examples=examples(40))
 def test_jumps_reach_corner_cells_by_ways_that_there_are(contracted, classes, seed):

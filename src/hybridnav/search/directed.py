@@ -140,6 +140,28 @@ class DirectedSides:
         rows, cols = (cells[near + 1] - cells[near]).T
         return bool((masks[near] >> _DIRECTION[rows + 1, cols + 1] & 1).any())
 
+    def bars(self, cells: LongArray, free: BoolArray) -> bool:
+        """Return whether a path of cells, int64 (n, 2), cannot be driven round its corners.
+
+        A move is forbidden, or a diagonal one cannot go by either of the two other cells at its
+        corner, of which one at least is free in `free`, bool (rows, cols).
+        """
+        if self.meets(cells):
+            return True
+        ends = cells[:-1], cells[1:]
+        first, last = (end[(ends[0] != ends[1]).all(axis=1)] for end in ends)
+        is_beside = is_open = np.zeros(len(first), bool)
+        for row, col in ((first, last), (last, first)):
+            corner = np.stack([row[:, 0], col[:, 1]], axis=1)
+            is_free = free[tuple(corner.T)]
+            is_wrong = self._are_forbidden(first, corner) | self._are_forbidden(corner, last)
+            is_beside, is_open = is_beside | is_free, is_open | is_free & ~is_wrong
+        return bool((is_beside & ~is_open).any())
+
+    def _are_forbidden(self, cells: LongArray, to: LongArray) -> BoolArray:
+        rows, cols = (to - cells).T
+        return (self.moves[tuple(cells.T)] >> _DIRECTION[rows + 1, cols + 1] & 1).astype(bool)
+
     def lost(self, enterable: BoolArray) -> tuple[str, ...]:
         """Return the names of what has no side between two cells that may be entered."""
         ends = self.sides[:, :2], self.sides[:, 2:]

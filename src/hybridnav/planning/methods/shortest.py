@@ -295,10 +295,12 @@ class OverMesh(Method):
         if tuple(passed[-1].tolist()) != cells[1]:
             parts.append(np.array([cells[1]]))
         passed = passed if len(parts) == 1 else np.concatenate(parts)
-        if query.closed is None or query.one_way is None or not query.one_way.meets(passed):
+        if query.closed is None or query.one_way is None:
             return passed
-        # Along a side, or at a corner, the cell on the other hand is listed.
+        # Along a side, or at a corner, the cell on the other hand may be listed.
         with self._round(self._on_mesh(), query.closed).open_cells() as free:
+            if not query.one_way.bars(passed, free):
+                return passed
             return cells_across(free, query.one_way, path.positions, cells)
 
     def _passed_beside(self, closed: ClosedCells, positions: FloatArray) -> LongArray:

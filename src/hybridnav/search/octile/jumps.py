@@ -309,7 +309,8 @@ class JumpSearch:
         number[side, nodes] = np.arange(len(nodes))
         parents = np.where(begins, -1, number[side, np.where(begins, 0, by >> 32)])
         first = octile_of(abs(cells - ends[side]))
-        steps = np.where(begins, first, graph.arcs[np.where(begins, 0, by & 0xFFFFFFFF), 0])
+        steps = first.copy()  # of a graph that may have no arc
+        steps[~begins] = graph.arcs[by[~begins] & 0xFFFFFFFF, 0]
         best = straight * STRAIGHT + diagonal * DIAGONAL if straight >= 0 else None
         return recorded(cells, parents, steps, ends[1 - side], (best, path))
 
