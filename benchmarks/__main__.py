@@ -6,15 +6,12 @@ import argparse
 import ast
 import os
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import NEEDED_DATA, Refused
 from hybridnav.errors import HybridNavError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 ROOT = Path(__file__).parents[1]
 SUBJECTS = {

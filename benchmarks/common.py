@@ -6,19 +6,16 @@ import fnmatch
 import os
 import time
 import warnings
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from hybridnav._base.typing import LongArray
+from hybridnav._base.typing import LongArray
 
 T = TypeVar("T")
 Option = tuple[tuple[str, ...], dict[str, Any]]

@@ -11,25 +11,20 @@ import importlib
 import importlib.metadata
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from hybridnav._base.moves import STEPS, legal_moves, moves_along
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError, UnsuitableMapError
 from hybridnav.harness.baselines.regions import CUT_CORNERS, CostClaim, MethodResult
-from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.costs import CostLayer
+from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps.costs import CostLayer
 
 Cell = tuple[int, int]
 

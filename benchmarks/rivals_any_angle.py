@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from benchmarks.rivals import Rival, needed_package, refuse_corner_cutting
+from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.harness.baselines.regions import AnyAngleResult, MethodResult
+from hybridnav.maps import OccupancyGrid
 from hybridnav.refine.ompl import OmplQuery, OmplSettings, Setup, Worker, require_ompl
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import OccupancyGrid
 
 Cell = tuple[int, int]
 

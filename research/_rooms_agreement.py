@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.rooms.merging import Forest
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import FloatArray, LongArray
 
 _BINS = 48
 _NONE = 255

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 import hybridnav as hn
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 from hybridnav.rooms.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
 from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
 from research._rooms_truth import FLOORS, Floor
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 
 SITES = {
     **dict.fromkeys(FLOORS, "GDC"),

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from scipy import ndimage
 
 import hybridnav as hn
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 from research._rooms_buildings import Building
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 
 _CELL_M = 0.05
 _MARGIN = 80

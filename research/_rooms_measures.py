@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import hybridnav as hn
 from benchmarks.common import print_head, print_row
+from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.rooms.find import judged_rooms
 from research._rooms_agreement import compare_rooms
 from research._rooms_buildings import SITES, Building
 from research.train_rooms import Training, of_generated
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from hybridnav._base.typing import FloatArray, IntArray
 
 NEAR_M = 1.0
 """How far a found door may lie from a true one."""

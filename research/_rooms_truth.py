@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import yaml
 from scipy import ndimage
 
 import hybridnav as hn
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray
 
 FLOORS = ("2", "3", "3ne")
 RADIUS_M = 0.25

@@ -10,9 +10,9 @@ from __future__ import annotations
 import itertools
 import sys
 import time
+from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
@@ -22,9 +22,6 @@ from benchmarks.common import NEEDED_DATA, option, print_head, print_row
 from hybridnav.route import MaxDistanceSearch
 from research._rooms_measures import measures_table
 from research._rooms_truth import FLOORS, Floor
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 NEAR_M = 1.0
 """How far a passage may lie from a true door."""

@@ -9,16 +9,17 @@ from __future__ import annotations
 
 import copy
 import math
+from argparse import Namespace
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import DATA, Refused, option
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.rooms import merging
 from hybridnav.rooms.cutting import Ground, fine_segments
 from hybridnav.rooms.find import LEAST_LIKELY, SPECK_M2, contract, outside_of
@@ -33,11 +34,6 @@ from hybridnav.rooms.merging import (
 from research._rooms_boost import Boosting, Examples, averaged, boost
 from research._rooms_buildings import SITES, Building
 from research._rooms_generated import generated
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from hybridnav._base.typing import FloatArray, LongArray
 
 VIEWS = ((0.0, 1.0), (17.0, 1.15), (0.0, 0.85))
 """Each building is seen turned by these degrees and scaled by these factors."""

@@ -12,14 +12,11 @@ import os
 import subprocess
 import sys
 import tempfile
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import ROOT, option
 from tools.wheels import Environment
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 OLDEST = "numpy==1.26.*"
 TESTS = (

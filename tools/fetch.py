@@ -13,14 +13,11 @@ import hashlib
 import http.client
 import sys
 import urllib.request
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import ROOT, option
 from hybridnav._base.files import replace_file
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 LIST = ROOT / "benchmarks" / "public_maps.tsv"
 HOST = "https://raw.githubusercontent.com"

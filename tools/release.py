@@ -9,16 +9,14 @@ from __future__ import annotations
 
 import json
 import re
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import tomllib
 import yaml
 
 from benchmarks.common import ROOT, option
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 OPTIONS = [
     option("--write", action="store_true", help="write CITATION.cff and codemeta.json"),

@@ -13,14 +13,11 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import Namespace
 from importlib.metadata import distributions
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import OFFICE, ROOT, option
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 ENDS = "--start", "1.0,13.2", "--goal", "40.6,19.4"
 LARGEST = 12

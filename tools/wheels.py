@@ -20,15 +20,13 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from benchmarks.common import ROOT, Refused, option
 from benchmarks.subjects.cold import PLAN
 from hybridnav._base.jit import LEVELS
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 EXERCISE = (
     *("tests/product/test_readme.py", "tests/product/test_notebooks.py"),

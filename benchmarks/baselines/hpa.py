@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,13 +12,10 @@ from benchmarks.baselines.kernels.hpa import AbstractGraph
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.moves import STRAIGHT, legal_moves
 from hybridnav._base.threads import Pool
+from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.baselines.regions import CUT_CORNERS, Cell, MethodResult, array_bytes
-from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
-    from hybridnav.maps import OccupancyGrid
+from hybridnav.maps import CellClass, OccupancyGrid
 
 
 @copies_alike

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy import ndimage
 
 from benchmarks.baselines.kernels import thrun as kernels
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.baselines.regions import RegionPlanner
-from hybridnav.maps import CellClass
+from hybridnav.harness.baselines.regions import Cell, MethodResult, RegionPlanner
+from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.route.coarse import ArcSearch
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-    from hybridnav.harness.baselines.regions import Cell, MethodResult
-    from hybridnav.maps import OccupancyGrid
 
 _AROUND = np.ones((3, 3), dtype=np.bool_)
 _STEPS = np.argwhere(_AROUND) - 1

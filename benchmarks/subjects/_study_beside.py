@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from matplotlib.axes import Axes
 
+from benchmarks.subjects._study_data import Data
 from hybridnav.viz import style
 from hybridnav.viz.canvas import new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from benchmarks.subjects._study_data import Data
 
 CHART, MAP = "beside-peers.svg", "bwi_gdc/3/3"
 _NAMES = {

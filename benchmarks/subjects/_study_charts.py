@@ -4,28 +4,24 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Protocol
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from benchmarks.subjects._study_data import LEVELS_FILE, common_pairs, groups, studies_of
 from benchmarks.subjects._study_descent import CHART, plot_levels_of
+from hybridnav._base.typing import FloatArray
+from hybridnav.harness.analysis import Study
 from hybridnav.harness.outcome import nanquantile
+from hybridnav.harness.yardstick import Optimum
 from hybridnav.viz import method_styles, plot_losses, plot_speed, save_figure
+from hybridnav.viz.charts import MethodStyle
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from matplotlib.axes import Axes
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.analysis import Study
-    from hybridnav.harness.yardstick import Optimum
-    from hybridnav.viz.charts import MethodStyle
-
-    Styles = Mapping[str, MethodStyle]
+Styles = Mapping[str, MethodStyle]
 
 
 class Draw(Protocol):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 from benchmarks.subjects._study_run import read_note
-from hybridnav.harness.analysis import load_study
+from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.columns import (
     CONSISTENCY_COLUMNS,
     EFFICIENCY_COLUMNS,
@@ -16,17 +18,11 @@ from hybridnav.harness.columns import (
     loss_columns,
 )
 from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.outcome import MapQuery, Outcome
 from hybridnav.harness.output import rows_of_methods
+from hybridnav.harness.records import Record
+from hybridnav.harness.timing import Circumstances
 from hybridnav.harness.yardstick import ANSWERED, TOO_SLOW, YARDSTICKS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-    from pathlib import Path
-
-    from hybridnav.harness.analysis import Study
-    from hybridnav.harness.outcome import MapQuery, Outcome
-    from hybridnav.harness.records import Record
-    from hybridnav.harness.timing import Circumstances
 
 LEVELS_FILE = "descent.json"
 """Loss and work of descents that end at each level, in the study's folder."""

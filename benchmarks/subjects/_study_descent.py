@@ -7,24 +7,20 @@ cells that `grid-astar` expands. Neither depends on the machine or on its load.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 import hybridnav as hn
 from benchmarks.common import print_head, print_row, read
+from benchmarks.subjects._study_data import Data
+from benchmarks.subjects._study_maps import StudyMap
 from hybridnav.harness.scenes import sample_pairs
 from hybridnav.viz import style
 from hybridnav.viz.canvas import new_figure
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from matplotlib.axes import Axes
-
-    from benchmarks.subjects._study_data import Data
-    from benchmarks.subjects._study_maps import StudyMap
 
 PLACES = "places"
 SIZES = {str(n): n for n in (1, 4, 16, 64, 128, 512, 2048)} | {PLACES: 0}

@@ -7,7 +7,6 @@ cannot take is a result. Routes on it are those of `hybridnav evaluate --graph`.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,17 +18,15 @@ from benchmarks.subjects._swagger_like import (
     skeleton_of,
     swagger_like,
 )
+from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import UnsuitableMapError
 from hybridnav.graphs import WaypointGraph, build_lane_graph
 from hybridnav.graphs.method import GraphMethod
+from hybridnav.harness.baselines import MethodResult
+from hybridnav.harness.baselines.regions import Cell
+from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-    from hybridnav.harness.baselines import MethodResult
-    from hybridnav.harness.baselines.regions import Cell
-    from hybridnav.maps import OccupancyGrid
 
 MOST_SKELETON = 100_000
 """Cells of the skeleton of free space up to which graphs are made: a maze whose corridors are a

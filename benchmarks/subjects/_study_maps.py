@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import fnmatch
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from hybridnav.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 ROS_MAPS = (
     "aws_small_warehouse/002/map.yaml",

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from benchmarks.subjects._study_data import Data
 from benchmarks.subjects._study_maps import KINDS
 from benchmarks.subjects._study_quotes import quoted
-from benchmarks.subjects._study_tables import TITLES, best_of, tables_of
+from benchmarks.subjects._study_tables import TITLES, StudyTable, best_of, tables_of
 from hybridnav.harness.columns import DEFINITION
 from hybridnav.harness.tables import markdown_of, text_of, to_markdown
-
-if TYPE_CHECKING:
-    from benchmarks.subjects._study_data import Data
-    from benchmarks.subjects._study_tables import StudyTable
 
 PUBLISHED: list[dict[str, str | float]] = [
     {

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from benchmarks.subjects._study_data import Data
 from benchmarks.subjects._study_descent import DEFAULT, PLACES, means_of
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.tables import text_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from benchmarks.subjects._study_data import Data
 
 _FIGURE = r"(?P<{}>(?:< )?-?\d+(?:,\d{{3}})*(?:\.\d+)?(?:\s+times\s+(?:faster|slower))?)"
 _HOLE = re.compile(r"\{(\w+)\}")

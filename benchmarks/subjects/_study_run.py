@@ -7,25 +7,21 @@ import inspect
 import json
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import hybridnav as hn
 from benchmarks.rivals import needed_package
+from benchmarks.subjects._study_maps import StudyMap
 from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError
 from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
 from hybridnav.harness.names import NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, write_records
-from hybridnav.planning import load_preset
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from benchmarks.subjects._study_maps import StudyMap
-    from hybridnav.planning import Preset
+from hybridnav.planning import Preset, load_preset
 
 RUN_FILE = "study-run.json"
 COSTS = ("clearance",)

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from benchmarks.subjects._study_data import Data
 from benchmarks.subjects._study_run import GRAPHS
 from hybridnav.harness.columns import CONSISTENCY_COLUMNS, loss_columns
 from hybridnav.harness.tables import shown, text_of
 from hybridnav.harness.yardstick import OPTIMA, YARDSTICKS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from benchmarks.subjects._study_data import Data
 
 TITLES = {
     "lengths": "Lengths",

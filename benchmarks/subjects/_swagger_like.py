@@ -13,20 +13,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import networkx as nx
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import ndimage
 from scipy.spatial import Delaunay, KDTree, QhullError
 from skimage import feature, measure, morphology
 
+from hybridnav._base.typing import BoolArray, LongArray
 from hybridnav.refine import Sight
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from hybridnav._base.typing import BoolArray, LongArray
 
 Cell = tuple[int, int]
 

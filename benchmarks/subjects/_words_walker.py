@@ -12,20 +12,17 @@ import heapq
 import itertools
 import math
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray, IntArray
-    from hybridnav.rooms import Door, Rooms
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray
+from hybridnav.rooms import Door, Rooms
 
 # Reading: from a sentence to what it asks for.
 

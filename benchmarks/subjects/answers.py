@@ -15,23 +15,19 @@ import io
 import json
 import re
 import tempfile
+from argparse import Namespace
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
 
 import hybridnav as hn
 from benchmarks.common import DATA, OFFICE, ROOT, option
-from benchmarks.subjects._study_maps import maps_of
+from benchmarks.subjects._study_maps import StudyMap, maps_of
 from hybridnav.cli.app import run
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable, Iterator
-
-    from benchmarks.subjects._study_maps import StudyMap
 
 ANSWERS = ROOT / "tests" / "product" / "answers.json"
 EXPLORED = ROOT / "maps" / "office-explored" / "office-explored.yaml"

@@ -11,17 +11,15 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
 from benchmarks.common import ROOT, SEED, option
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator
 
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
 FINISHES = ("none", "line-of-sight", "arcs")

@@ -19,11 +19,13 @@ many answers, and how many of them have no path.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from typing import Any
 
 import numpy as np
 import shapely
 
+import hybridnav as hn
 from benchmarks.common import (
     DATA,
     OFFICE,
@@ -38,11 +40,6 @@ from benchmarks.common import (
 )
 from hybridnav.planning.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    import hybridnav as hn
 
 COLUMNS = ("beside", "first", "later")
 CLOSED = 4

@@ -12,13 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import OFFICE, option
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 PLAINLY = {key: text for key, text in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
 """The environment in which Python keeps the bytecode of modules, as it does for users."""

@@ -10,21 +10,17 @@ from __future__ import annotations
 
 import math
 import time
+from argparse import Namespace
+from collections.abc import Iterable
 from decimal import Context, Decimal, localcontext
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.common import option
-from hybridnav.refine.curves import shortest_curve
+from hybridnav.refine.curves import Curve, Pose, shortest_curve
 
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterable
-
-    from hybridnav.refine.curves import Curve, Pose
-
-    Exact = tuple[Decimal, Decimal, Decimal]
+Exact = tuple[Decimal, Decimal, Decimal]
 
 DIGITS = Context(prec=50)
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582")

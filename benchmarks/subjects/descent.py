@@ -12,7 +12,8 @@ over that of the first row.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from typing import Any
 
 import numpy as np
 
@@ -30,9 +31,6 @@ from benchmarks.common import (
 )
 from benchmarks.subjects._study_maps import maps_of as study_maps
 from hybridnav._base.moves import path_length_in_cells
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 COLUMNS = (
     "map", "free cells", "A*, ms", "of means", "median", "loss %", "worst", "expanded",

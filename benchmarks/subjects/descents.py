@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from argparse import Namespace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage, sparse
@@ -23,9 +24,6 @@ import hybridnav as hn
 from benchmarks.common import SEED, option
 from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search import descent
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 OPTIONS = [option("--count", type=int, default=100_000, help="maps (100,000)"), SEED]
 PAIRS = 3

@@ -7,16 +7,13 @@ differs by more than 1e-9 of it.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
 import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, OFFICE, option, print_head, print_load, print_row, read
 from hybridnav.maps import CellClass
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 MAPS = ("bwi_gdc/3/3.yaml", "strands/tsc_y4/tsc_1701.yaml", "fetch_maps/4_26_15.yaml")
 COLUMNS = ("map", "preset", "us a pair", "`plan_many`, us", "times", "most off, m", "no path, %")

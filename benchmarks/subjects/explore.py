@@ -7,23 +7,17 @@ the start and the robot's map does not know it in the end.
 from __future__ import annotations
 
 import time
+from argparse import Namespace
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 import hybridnav as hn
 from benchmarks.common import option, print_head, print_load, print_row
-from hybridnav.ext.live.explore import explore, laser_all_round
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from numpy.typing import NDArray
-
-    from hybridnav.ext.live.explore import By
+from hybridnav.ext.live.explore import By, explore, laser_all_round
 
 _WALL, _DEPTH, _LEAST_ROOM, _BIG_ROOM = 2, 4, 10, 24
 

@@ -17,9 +17,11 @@ from __future__ import annotations
 
 import sys
 import time
+from argparse import Namespace
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -27,6 +29,7 @@ from scipy.spatial import KDTree
 
 import hybridnav as hn
 from benchmarks.common import DATA, OFFICE, matches, option, read
+from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.graphs.attach import (
     MANY_CANDIDATES,
     Network,
@@ -37,15 +40,8 @@ from hybridnav.graphs.attach import (
 from hybridnav.graphs.judge import FreeSpace, excess_of
 from hybridnav.graphs.kernels import least_along
 from hybridnav.graphs.sketch import settled
-from hybridnav.harness.tables import to_markdown
+from hybridnav.harness.tables import Row, to_markdown
 from hybridnav.rooms.doors import measured_clearance_m
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from pathlib import Path
-
-    from hybridnav._base.typing import FloatArray, LongArray
-    from hybridnav.harness.tables import Row
 
 GRAPHS = {
     "nav2/graphs/nav2_bringup/depot_graph.geojson": "nav2/maps/depot.yaml",

@@ -9,18 +9,15 @@ the other one occupied.
 from __future__ import annotations
 
 import time
+from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, option, print_head, print_row, read
 from hybridnav.ext.live.mapping import LaserModel, Mapper
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 
 @dataclass(frozen=True)

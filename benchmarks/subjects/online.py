@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import time
 import warnings
+from argparse import Namespace
+from collections.abc import Iterator
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import hybridnav as hn
 from benchmarks.common import (
@@ -29,15 +33,8 @@ from benchmarks.common import (
 from hybridnav.ext.live import OnlinePyramid
 from hybridnav.ext.live.mapping import Mapper
 
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    Classes = NDArray[np.uint8]
-    Area = tuple[float, ...]
+Classes = NDArray[np.uint8]
+Area = tuple[float, ...]
 
 INTEL = "radish_grids/intel.yaml"
 INTEL_LOG = "radish_logs/intel-corrected.log.gz"

@@ -12,7 +12,9 @@ alone.
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,10 +22,6 @@ import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, RADIUS_M, option, print_head, print_row
 from hybridnav.ext.live import OnlineRooms, ReplayFigures, grids_of_scans, replay
 from hybridnav.ext.live.mapping import Mapper
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from pathlib import Path
 
 LOGS = {
     "Intel": "radish_logs/intel-corrected.log.gz",

@@ -11,9 +11,11 @@ taken in one process.
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, NamedTuple
+from argparse import Namespace
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import hybridnav as hn
 from benchmarks.common import option, print_head, print_load, print_row, with_classes
@@ -21,12 +23,7 @@ from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search.mesh import build_mesh
 from hybridnav.search.octile import build_jump_graph, contract_graph
 
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from numpy.typing import NDArray
-
-    Classes = NDArray[np.uint8]
+Classes = NDArray[np.uint8]
 
 SIDES = (500, 1000, 2000, 4000)
 CHANGE = 60

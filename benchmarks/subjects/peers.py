@@ -8,7 +8,9 @@ Paths of cells are compared with the octile optimum, paths at any angle with the
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -29,12 +31,7 @@ from benchmarks.common import (
 from benchmarks.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, ScikitImage, Scipy, Tcod
 from benchmarks.rivals_any_angle import ExtremityPathfinder
 from hybridnav._base.moves import path_length_in_cells
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable
-
-    from hybridnav.maps import OccupancyGrid
+from hybridnav.maps import OccupancyGrid
 
 MAPS = (
     "nav2/maps/tb3_sandbox.yaml",

@@ -8,22 +8,17 @@ along the paths, every 5 cm. Times are of one process, planners prepared.
 from __future__ import annotations
 
 import time
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import OFFICE, option, read
-from hybridnav.harness.tables import to_markdown
+from hybridnav._base.typing import FloatArray
+from hybridnav.harness.tables import Row, to_markdown
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.costs import cost_along
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from hybridnav._base.typing import FloatArray
-    from hybridnav.harness.tables import Row
 
 BY_COSTS = "grid-astar, costs"
 PRESETS = ("shortest", "octile", "grid-astar", "paper", BY_COSTS, "robot")

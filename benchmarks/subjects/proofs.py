@@ -24,8 +24,10 @@ import copy
 import hashlib
 import json
 import zlib
+from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -35,13 +37,8 @@ from benchmarks.common import NEEDED_DATA, SEED, option, print_head, print_load,
 from benchmarks.common import read as read_grid
 from benchmarks.subjects._study_maps import maps_of
 from hybridnav import check_proof
+from hybridnav._base.typing import ByteArray, FloatArray
 from hybridnav.errors import HybridNavError
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator
-
-    from hybridnav._base.typing import ByteArray, FloatArray
 
 Proof = dict[str, Any]
 MORE = 1e-6

@@ -21,8 +21,10 @@ import itertools
 import json
 import math
 import time
+from argparse import Namespace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -30,14 +32,9 @@ import shapely
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, Refused, option, print_head, print_load, print_row, read
 from benchmarks.subjects.proofs import is_accepted
+from hybridnav._base.typing import BoolArray, FloatArray
+from hybridnav.maps import ShapeGrids
 from hybridnav.maps.files import load_scenarios
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator, Sequence
-
-    from hybridnav._base.typing import BoolArray, FloatArray
-    from hybridnav.maps import ShapeGrids
 
 CYLINDER_M = 0.075
 DISC_M = 0.225

@@ -19,7 +19,8 @@ maps 0. Pairs are drawn from the largest connected part. Columns:
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from argparse import Namespace
+from typing import Any
 
 import numpy as np
 import shapely
@@ -39,11 +40,7 @@ from benchmarks.common import (
     timed,
 )
 from benchmarks.subjects._study_maps import maps_of
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from hybridnav._base.typing import FloatArray
+from hybridnav._base.typing import FloatArray
 
 MEASURED = ("plan", "A*", "A*, arcs", "bound", "gap", "steady", "moved", "dearer")
 COLUMNS = ("map", *MEASURED[:3], "speedup", "of arcs", *MEASURED[3:-1], "duplicates")

@@ -27,10 +27,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from argparse import SUPPRESS
+from argparse import SUPPRESS, Namespace
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -47,12 +48,7 @@ from benchmarks.common import (
     print_row,
     read,
 )
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Callable
-
-    from hybridnav._base.typing import ByteArray, FloatArray
+from hybridnav._base.typing import ByteArray, FloatArray
 
 TILES = (
     "willow/willow-2010-02-18-0.10.yaml",

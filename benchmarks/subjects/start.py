@@ -14,8 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,12 +24,7 @@ from benchmarks.common import OFFICE, ROOT, option, prepared, read
 from benchmarks.subjects.cold import PLAINLY
 from benchmarks.subjects.scale import tile_of
 from benchmarks.worlds import World
-from hybridnav.harness.tables import to_markdown
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-    from hybridnav.harness.tables import Row
+from hybridnav.harness.tables import Row, to_markdown
 
 FIGURE = ROOT / "maps" / "figure1" / "figure1.yaml"
 QUERY = ("--start", "1.0,13.2", "--goal", "40.6,19.4")

@@ -19,16 +19,17 @@ import json
 import os
 import sys
 import time
+from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import DATA, ROOT, Refused, option
 from benchmarks.subjects._study_beside import CHART as BESIDE_CHART
 from benchmarks.subjects._study_beside import MAP as BESIDE_MAP
 from benchmarks.subjects._study_beside import plot_beside
 from benchmarks.subjects._study_charts import charts_of, write_charts
-from benchmarks.subjects._study_data import LEVELS_FILE, collect
+from benchmarks.subjects._study_data import LEVELS_FILE, Data, collect
 from benchmarks.subjects._study_descent import CHART, levels_of, plot_levels_of
 from benchmarks.subjects._study_maps import lost_of, maps_of
 from benchmarks.subjects._study_page import page
@@ -37,12 +38,6 @@ from benchmarks.subjects._study_run import PLANS, parts_of, run
 from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError
 from hybridnav.viz import save_figure
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Mapping
-
-    from benchmarks.subjects._study_data import Data
 
 PART = "part"
 """Name of a plan that asks less than the study does."""

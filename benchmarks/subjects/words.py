@@ -7,21 +7,17 @@ point of a room to another room, both drawn with a seed.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, SEED, option, print_head, print_row
 from benchmarks.subjects._words_walker import Lost, Place, Walker
+from hybridnav.guide import Tour
 from research._rooms_buildings import Building
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from hybridnav.guide import Tour
 
 REPORTED = ("2", "freiburg_building101", "ubremen-cartesium-demo4")
 """The maps of the reported figures: nobody looks at their routes before the words are finished."""

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.common import option
 from benchmarks.worlds import figure1_world, office_world, write_world
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 OPTIONS = [option("folder", type=Path)]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,10 +17,8 @@ from benchmarks.worlds.scan import (
     wobble,
 )
 from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED, World
+from hybridnav._base.typing import ByteArray
 from hybridnav.maps.frame import Frame
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray
 
 _FRAME = Frame(resolution_m=0.05, origin_m=(-3.0, -2.0))
 _SHAPE = (580, 960)

@@ -7,15 +7,12 @@ everywhere: sines differ in the last digit between processors, and the committed
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import BoolArray, ByteArray, FloatArray
-    from hybridnav.maps import Frame
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray
+from hybridnav.maps import Frame
 
 Point = tuple[float, float]
 Rect = tuple[float, float, float, float]

@@ -5,20 +5,16 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.files import replace_file
+from hybridnav._base.typing import ByteArray, PathLike
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.maps import OccupancyGrid
+from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.maps.cells import MAX_CELLS
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import ByteArray, PathLike
-    from hybridnav.maps import Frame
 
 FREE = np.uint8(254)
 UNEXPLORED = np.uint8(205)

@@ -6,7 +6,7 @@ import itertools
 import math
 import re
 from dataclasses import fields
-from typing import TYPE_CHECKING, get_args
+from typing import get_args
 
 import pytest
 
@@ -23,10 +23,7 @@ from hybridnav.guide.words import (
     languages,
     sentences,
 )
-from hybridnav.guide.words.instruction import Side
-
-if TYPE_CHECKING:
-    from hybridnav.guide.words.instruction import Hand
+from hybridnav.guide.words.instruction import Hand, Side
 
 KITCHEN, CORRIDOR, LAB = Space("kitchen"), Space(None, "corridor"), Space("l3_404")
 AT = (1.0, 2.0)

@@ -6,7 +6,7 @@ import itertools
 import math
 import re
 from pathlib import Path as FilePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,14 +16,11 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav.guide.words import sentences
+from hybridnav.guide.words import Instruction, sentences
 from hybridnav.guide.words.itinerary import instructions_of
 from tests.drawn_rooms import HOUSE, SIDE, house, topology_of
 from tests.oracle.bends import Windows, simplified_corners
 from tests.strategies import examples
-
-if TYPE_CHECKING:
-    from hybridnav.guide.words import Instruction
 
 
 def turns_of(instructions: tuple[Instruction, ...]) -> list[tuple[float, float]]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,14 +14,9 @@ from hybridnav.harness.columns import consistency_row
 from hybridnav.harness.methods import baseline_spec, prepare
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.run import RunSettings, write_records
-from hybridnav.search.found import Found
+from hybridnav.search.found import Found, Query
 from tests.harness.small_runs import ROOMS, name_of, run_here, write_map
 from tests.planning.test_own_method import ByCells
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from hybridnav.search.found import Query
 
 
 class Boastful(ByCells):

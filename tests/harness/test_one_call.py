@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,9 +14,6 @@ from hybridnav.harness.tables import Table, latex_of
 from hybridnav.viz import plot_losses
 from tests.harness.faulty_methods import Raises
 from tests.harness.small_runs import ROOMS, write_map
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 METHODS = ("octile", "weighted-astar", hn.load_preset("shortest"))
 

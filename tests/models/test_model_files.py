@@ -10,8 +10,10 @@ import subprocess
 import sys
 import zipfile
 import zlib
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,10 +21,6 @@ import pytest
 import hybridnav as hn
 from benchmarks.worlds import figure1_world
 from hybridnav.models import container
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 PRESETS = ("shortest", "octile")
 START, GOAL = (0.55, 0.55), (2.55, 2.85)

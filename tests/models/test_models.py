@@ -6,7 +6,8 @@ import dataclasses
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hypothesis import given, settings
 import hybridnav as hn
 from benchmarks.worlds import figure1_world
 from hybridnav.models import structures
+from hybridnav.models.structures import Structure
 from hybridnav.pyramid.record import Record
 from hybridnav.search.mesh import (
     ConvexMesh,
@@ -25,11 +27,6 @@ from hybridnav.search.mesh import (
 from hybridnav.search.octile.jumps import JumpGraph
 from tests.product.test_copies import assert_alike, kernels
 from tests.strategies import Scene, examples, scenes
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from hybridnav.models.structures import Structure
 
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 PRESETS = [name for name in hn.preset_names() if name != "ompl"]

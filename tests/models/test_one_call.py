@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import pickle
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapNotFoundError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 Point = tuple[float, float]
 ENDS = (0.5, 0.5), (2.0, 2.5)

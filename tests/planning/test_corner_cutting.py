@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,13 +13,11 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks.baselines.hpa import HpaStar
 from benchmarks.baselines.thrun import ThrunMap
+from hybridnav.harness.baselines import Solver
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.maps import CellClass
 from tests.strategies import MAX_SIDE, drawn, examples
-
-if TYPE_CHECKING:
-    from hybridnav.harness.baselines import Solver
 
 PRESETS = ["paper", "octile", "grid-astar"]
 # Two free places that only a move between two blocked cells joins.

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,6 @@ from shapely.geometry import Point, shape
 import hybridnav as hn
 from tests.layers import grid_of
 from tests.strategies import class_grids, examples, labelled, occupancy_grid
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 NAMES = ("kitchen, big", 'the "lab"', "Büro;1", "=1+1", "-7")
 

@@ -7,7 +7,8 @@ import pickle
 import threading
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,9 +21,6 @@ from tests.interrupts import Struck, lines_of
 from tests.layers import layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
 from tests.strategies import class_grids, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 SEEDS = st.integers(0, 2**32 - 1)
 FOLLOWING = "shortest", "octile", "grid-astar"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,6 @@ from PIL import Image
 import hybridnav as hn
 from tests.plans import map_of
 from tests.strategies import examples
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 RADIUS_M, CELL_M = 0.3, 0.1
 PALLET = (2.0, 0.9, 3.0, 2.1)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import warnings
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,9 +18,6 @@ from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.scenes import sample_pairs
 from tests.oracle.grid import assert_legal, recounted
 from tests.strategies import class_grids, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 MAPS = [
     "nav2/maps/depot.yaml",

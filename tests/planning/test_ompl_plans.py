@@ -7,8 +7,9 @@ import math
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,10 +23,6 @@ from hybridnav.search.found import Query
 from tests.oracle.long_robot import CORNERS, Walls
 from tests.oracle.long_robot import rooms as rooms_with_doors
 from tests.strategies import drawn, occupancy_grid
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 
 pytest.importorskip("ompl")
 

@@ -4,7 +4,7 @@ that plans on cells."""
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,14 +16,12 @@ from scipy.sparse import csgraph
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.refine.one_way import on_grain, wrong_at
+from hybridnav.search.directed import DirectedSides
 from hybridnav.search.found import ClosedCells
 from tests.closures.test_one_way import STEPS, forbidden_by
 from tests.oracle.grid import assert_legal, move_graph
 from tests.plans import PLAIN, PRESETS, TWO_ROOMS, map_of, points_in, scene_map
 from tests.strategies import Scene, occupancy_grid, scenes
-
-if TYPE_CHECKING:
-    from hybridnav.search.directed import DirectedSides
 
 SEED = st.integers(0, 2**32 - 1)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +14,6 @@ import pytest
 import hybridnav as hn
 from hybridnav.search.found import Found
 from hybridnav.search.grid_search import GridSearch
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 START, GOAL = (0.5, 0.5), (2.0, 2.5)
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import hybridnav as hn
 from hybridnav.refine import GridRefiner
+from hybridnav.topology import TopologicalMap
 from tests.strategies import drawn, occupancy_grid
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from hybridnav.topology import TopologicalMap
-
-    Write = Callable[[str, str], None]
+Write = Callable[[str, str], None]
 
 START, GOAL = (0.5, 0.5), (6.5, 2.5)
 FAULTS = """

@@ -8,8 +8,9 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -22,9 +23,6 @@ from hybridnav.maps import CellClass
 from tests.oracle.corridors import corridor_of
 from tests.oracle.grid import assert_legal, centre, components, distances, move_graph, recounted
 from tests.strategies import Scene, drawn, examples, occupancy_grid, scenes
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 MAPS = Path(__file__).parents[2] / "maps"
 OPEN = drawn(*["." * 9] * 6)

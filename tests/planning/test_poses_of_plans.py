@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,9 +17,6 @@ from hybridnav.messages import pose_of
 from hybridnav.planning import load_preset
 from tests.plans import TWO_ROOMS, grid_of, map_of, points_in, scene_map
 from tests.strategies import Scene, examples, scenes
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 PLAIN = ("shortest", "octile", "grid-astar", "paper", "robot")
 OMPL = ("r2", "se2", "dubins", "reeds-shepp", "differential")

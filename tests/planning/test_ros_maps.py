@@ -6,20 +6,18 @@ import os
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
 from tests.oracle.corridors import corridor_of
 from tests.oracle.grid import assert_legal, components, inflated, length_of_points, recounted
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Cells = NDArray[np.int64]
+Cells = NDArray[np.int64]
 
 RADIUS_M = 0.25
 MERGE_DISTANCE_M = 4.0

@@ -8,7 +8,8 @@ import math
 import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,9 +23,6 @@ from hybridnav.planning.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
 from tests.oracle.any_angle import some_positions
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 seeds = st.integers(0, 2**32 - 1)
 FRAMES = (hn.Frame(1.0), hn.Frame(0.05, (12.3, -400.0), 0.7), hn.Frame(0.1, (5e5, 4e6), -2.0))

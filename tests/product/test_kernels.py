@@ -8,14 +8,11 @@ numba knows the types of a kernel only where it has been called.
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 
 from tests.product.house import SRC
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 MOST = 4
 ARRAYS = {"moments", "place"}

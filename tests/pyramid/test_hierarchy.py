@@ -7,7 +7,7 @@ import itertools
 import os
 import weakref
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -24,9 +24,6 @@ from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap
 from tests.strategies import IS_FULL, MAX_SIDE, drawn, examples, occupancy_grid
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(24 if IS_FULL else 20, MAX_SIDE)

@@ -6,16 +6,14 @@ and right rim. Moves are legal on the whole grid; inside a cluster both cells of
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import grow, pop, push
 from hybridnav._base.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
-
-if TYPE_CHECKING:
-    from hybridnav._base.typing import IntArray, LongArray
+from hybridnav._base.typing import IntArray, LongArray
 
 LONG_RUN = 6
 """Facing pairs from which an entrance has a transition at either end, not one in the middle."""

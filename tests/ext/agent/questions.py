@@ -8,20 +8,17 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import csgraph
 
 from tests.oracle.grid import move_graph
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from numpy.typing import NDArray
 
 RESOLUTION_M = 0.25
 NAMES = ("kitchen 1", "Kitchen 2", "ward 1", "ward 2", "ward 10", "Büro", "lab", "store", "hall A")

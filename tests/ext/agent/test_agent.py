@@ -9,9 +9,10 @@ import subprocess
 import sys
 import threading
 from collections import Counter
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,9 +23,6 @@ from hybridnav.ext.page import Opening, Session, Site
 from hybridnav.ext.page.kept import RoomsFile
 from tests.ext.agent.questions import RESOLUTION_M, Judge, PaintedFloor
 from tests.ext.page.server import served
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
 
 mcp = pytest.importorskip("mcp")
 

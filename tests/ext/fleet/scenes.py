@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
 import hybridnav as hn
 from hybridnav.harness.judges import VisibilityGraph
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 STEPS = [(0, 1), (1, 0), (1, 1), (1, -1)]
 KINDS = ("lift", "stairs", "ramp")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -22,9 +23,6 @@ from hybridnav.ext.fleet import (
 from hybridnav.ext.fleet.graph_network import BuildingNetwork
 from hybridnav.graphs import BUILDING_KINDS
 from tests.houses import LIFT, STAIRS, two_rooms
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 NODES = {"a": (1.5, 1.5), "b": (2.5, 2.5), "c": (4.5, 2.5), "d": (6.5, 2.5), "e": (7.5, 4.5)}
 EDGES = [("a", "b"), ("b", "c"), ("c", "d"), ("d", "e")]

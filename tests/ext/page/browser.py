@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WINDOW: dict[str, Any] = {"viewport": {"width": 1280, "height": 800}, "color_scheme": "light"}

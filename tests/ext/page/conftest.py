@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 pytest.importorskip("uvicorn", reason="the page needs the extra view")
 pytest.importorskip("starlette", reason="the page needs the extra view")
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import hybridnav as hn
 from tests.ext.page.browser import WINDOW, Shown, browsing
 from tests.ext.page.server import (
     FRAME,
+    Client,
     building_site_of,
     folder_in,
     served,
@@ -20,12 +24,6 @@ from tests.ext.page.server import (
     write_building,
     write_house,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
 
 
 @pytest.fixture(scope="module")

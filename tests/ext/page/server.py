@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from http.client import HTTPConnection
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +20,6 @@ from hybridnav.ext.page import Session, Site
 from hybridnav.ext.page.app import make_app, make_server
 from hybridnav.ext.page.command import BuildingPage
 from hybridnav.ext.page.kept import RoomsFile
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 TOKEN = "0123456789abcdef"  # noqa: S105 - of a test
 MAP = """\

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from tests.ext.page.browser import WINDOW, Shown
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client
 
 CONTROLS = {
     *("button", "textbox", "combobox", "checkbox", "radio", "slider", "spinbutton", "listbox"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +13,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.ext.page.tiles import MapLayer, map_layer, palette
-from tests.ext.page.server import query_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client, query_of
 
 QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import hybridnav as hn
 from tests.ext.page.browser import WINDOW, Shown
-from tests.ext.page.server import query_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client, query_of
 
 
 @pytest.fixture

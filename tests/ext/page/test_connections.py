@@ -5,21 +5,16 @@ from __future__ import annotations
 import json
 import socket
 import time
+from collections.abc import Iterator
 from contextlib import ExitStack, closing, suppress
 from http.client import HTTPConnection
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.page import app, serve
-from tests.ext.page.server import TOKEN, folder_in, served, site_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import TOKEN, Client, folder_in, served, site_of
 
 HEAD = f"POST /{TOKEN}/plan HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\n"
 BODY = "Content-Type: application/json\r\nContent-Length: 100\r\n\r\n{"

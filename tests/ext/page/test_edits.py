@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +13,6 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.ext.page.requests import Merge, Move, Rename, Split, changed, rings_of
 from tests.strategies import examples
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ROWS, COLS = 12, 18
 GRID = hn.OccupancyGrid(np.zeros((ROWS, COLS), np.float32), robot_radius_m=0)

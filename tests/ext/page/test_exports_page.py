@@ -6,7 +6,9 @@ import csv
 import errno
 import json
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +17,7 @@ from PIL import Image
 
 import hybridnav as hn
 from tests.ext.page.browser import WINDOW, Shown
-from tests.ext.page.server import query_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client, query_of
 
 QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 KINDS = ("path-geojson", "path-csv", "nav2", "rooms", "model")

@@ -6,18 +6,14 @@ import itertools
 import json
 import re
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import hybridnav as hn
 from tests.ext.page.browser import WINDOW, Shown
-from tests.ext.page.server import served, site_of, write_map
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client, served, site_of, write_map
 
 ASSETS = files("hybridnav.ext.page") / "assets"
 LAPTOP = {"width": 1440, "height": 900}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,12 +13,14 @@ import pytest
 import hybridnav as hn
 from hybridnav.ext.page import kept
 from hybridnav.ext.page.requests import Favour, Find
-from tests.ext.page.server import building_site_of, query_of, served, site_of, write_building
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import (
+    Client,
+    building_site_of,
+    query_of,
+    served,
+    site_of,
+    write_building,
+)
 
 FILE = ".hybridnav-favourites.json"
 

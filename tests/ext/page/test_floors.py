@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import shapely
 
 import hybridnav as hn
-from tests.ext.page.server import building_site_of, query_of, served, session_of, write_building
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import (
+    Client,
+    building_site_of,
+    query_of,
+    served,
+    session_of,
+    write_building,
+)
 
 START: dict[str, Any] = {"floor": 0, "point": [20.5, 40.5]}
 GOAL: dict[str, Any] = {"floor": 1, "point": [60.5, 8.5]}

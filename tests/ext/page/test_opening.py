@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
+from typing_extensions import Self
 
 import hybridnav as hn
 from hybridnav.ext.page import Opening, Site, serve
@@ -20,13 +23,6 @@ from tests.ext.page.server import (
     site_of,
     write_building,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from typing_extensions import Self
-
 
 OVER_FLOORS = {
     "start": {"floor": 0, "point": [20.5, 40.5]},

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import hybridnav as hn
 from hybridnav.ext.page.tiles import palette
 from tests.ext.page.browser import Shown
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client
 
 START, GOAL = (10.5, 40.5), (70.5, 10.5)
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from tests.ext.page.browser import Shown
-
-if TYPE_CHECKING:
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client
 
 pytestmark = pytest.mark.full
 START, GOAL = (10.5, 40.5), (70.5, 10.5)

@@ -10,7 +10,8 @@ import subprocess
 import sys
 import time
 from http.client import HTTPConnection
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,12 +20,7 @@ import hybridnav as hn
 from hybridnav.ext.page import Session
 from hybridnav.ext.page.kept import RoomsFile
 from hybridnav.ext.page.requests import Edit
-from tests.ext.page.server import session_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
+from tests.ext.page.server import Client, session_of
 
 
 def _rename(client: Client, version: int, room: str, name: str) -> Any:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.ext.page.browser import Shown, browsing
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def _save(cli: Any, folder: Path, *more: object) -> Any:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.ext.page.server import (
     TOKEN,
+    Client,
     building_site_of,
     folder_in,
     query_of,
@@ -17,12 +20,6 @@ from tests.ext.page.server import (
     site_of,
     write_building,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.ext.page.server import Client
 
 QUERY = query_of([10.5, 40.5], [70.5, 10.5])
 
