@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -59,6 +59,12 @@ def _grown(shapes, radii_m, factor):
 
 
 @given(world=worlds())
+@example(
+    (
+        [shapely.LineString([(0, 0), (0, 0.125)]), shapely.LineString([(-0.125, 0), (1.75, 0.75)])],
+        [0.0, 0.0],
+    )
+)
 @settings(max_examples=examples(100))
 def test_cells_are_blocked_as_polygons_inside_and_outside_of_the_shapes_say(world):
     shapes, radii_m = world
@@ -70,7 +76,9 @@ def test_cells_are_blocked_as_polygons_inside_and_outside_of_the_shapes_say(worl
     core = shapely.buffer(boxes, -1e-6 * SIDE, join_style="mitre")
     # What lies surely in, or surely not: between them the polygons of circles do not decide.
     assert met[shapely.intersects(core, small)].all()
-    assert not met[~shapely.intersects(boxes, large)].any()
+    # The union's nodes are rounded: a line of it may miss the corner of a cell that it touches.
+    wide = shapely.buffer(boxes, 1e-9 * SIDE, join_style="mitre")
+    assert not met[~shapely.intersects(wide, large)].any()
     # Of collections with a point shapely 2.2 says they cover nothing: see findings/.
     thick = shapely.union_all([part for part in shapely.get_parts(large) if part.area])
     assert not inside[~shapely.covers(thick, core)].any()
