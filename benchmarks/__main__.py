@@ -1,7 +1,5 @@
 """Run a subject: `python -m benchmarks NAME [options]`; without a name, list all of them."""
 
-from __future__ import annotations
-
 import argparse
 import ast
 import os

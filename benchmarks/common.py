@@ -1,7 +1,5 @@
 """What several subjects share: options, maps, times, tables."""
 
-from __future__ import annotations
-
 import fnmatch
 import os
 import time

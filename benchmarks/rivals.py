@@ -5,8 +5,6 @@
 `rivals_any_angle` has those whose paths are not of cells.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.metadata
 import math

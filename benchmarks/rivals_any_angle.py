@@ -1,7 +1,5 @@
 """Any-angle planners of others on the whole map, as methods of the harness."""
 
-from __future__ import annotations
-
 import math
 import time
 from typing import Any

@@ -1,7 +1,5 @@
 """The agreement of found rooms with true ones."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Gradient boosting of small complete trees, for the judge of rooms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -5,8 +5,6 @@ to stdout, a picture per building (people's rooms and found ones) to the folder,
 default. The judge of rooms is trained anew for each site, on the others alone.
 """
 
-from __future__ import annotations
-
 import itertools
 import sys
 import time

@@ -5,8 +5,6 @@ the documentation are of forests that never saw the building's site (`without`).
 it is made from generated floors alone.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from argparse import Namespace

@@ -3,8 +3,6 @@
 Runs in the environment of each Python, with `NUMBA_CPU_NAME` set to the level.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import sys

@@ -6,8 +6,6 @@ every preset, pyramids and rooms, the saved models, the commands, maps, the file
 that answers depend on no processor. Exits with 1 where one fails.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -6,8 +6,6 @@ which maps are missing, and goes on without them. The four raw maps of SLAM are 
 since nobody publishes them as maps: they are made of laser logs.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import http.client

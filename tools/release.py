@@ -5,8 +5,6 @@ codemeta.json. Without it, all that a release must fill or agree on is checked: 
 fault, exit code 1 where there is any.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from argparse import Namespace

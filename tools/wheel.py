@@ -5,8 +5,6 @@ runs it in an empty folder with an empty home: the version, a first plan, a firs
 preset, and two plans at once on an empty cache. Exits with 1 where a command fails.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

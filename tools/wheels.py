@@ -8,8 +8,6 @@ written, the answers of `tests.answers` must be those of a run that compiles for
 for bit, with nothing compiled. Exits with 1 where one fails.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import pickle

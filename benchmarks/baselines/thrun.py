@@ -1,7 +1,5 @@
 """Thrun's map: regions cut out of free space by critical lines of its Voronoi diagram."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy import ndimage
 

@@ -1,7 +1,5 @@
 """The chart of the first page: time and loss of every method on one map of the study, as bars."""
 
-from __future__ import annotations
-
 from matplotlib.axes import Axes
 
 from benchmarks.subjects._study_data import Data

@@ -1,7 +1,5 @@
 """The charts of the study: vectors, and no picture of a map."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

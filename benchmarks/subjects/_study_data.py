@@ -1,7 +1,5 @@
 """The figures of the study as plain values: all that its page, its tables and its quotes hold."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -5,8 +5,6 @@ Loss is over the octile optimum, in the mean; work is what is expanded, fields a
 cells that `grid-astar` expands. Neither depends on the machine or on its load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The maps of the study: twelve of ROS, four raw ones of SLAM, twelve of MovingAI."""
 
-from __future__ import annotations
-
 import fnmatch
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The page of the study, written from its figures and nothing else."""
 
-from __future__ import annotations
-
 from benchmarks.subjects._study_data import Data
 from benchmarks.subjects._study_maps import KINDS
 from benchmarks.subjects._study_quotes import quoted

@@ -1,7 +1,5 @@
 """Figures of the study that other pages quote: each is found by the words around it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The runs of the study: lengths, costs and OMPL, each into a folder of its own, all resumable."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import inspect
 import json

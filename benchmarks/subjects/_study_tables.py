@@ -1,7 +1,5 @@
 """The tables of the study as texts: the page, the PDF and the HTML report show the same ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace

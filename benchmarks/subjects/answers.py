@@ -6,8 +6,6 @@ exit code is 1 if one differs. Parts: `plans` (28 public maps, each preset, 16 p
 JSON of the commands). Times are left out, and so are paths of this machine.
 """
 
-from __future__ import annotations
-
 import contextlib
 import fnmatch
 import hashlib

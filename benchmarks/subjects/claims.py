@@ -6,8 +6,6 @@ a hundredth of a cell apart, the cost from the factors that these meet. Exits wi
 states something else.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

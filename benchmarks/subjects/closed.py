@@ -16,8 +16,6 @@ cells the planner has found before: finding those of a door takes some 10 ms, on
 many answers, and how many of them have no path.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from typing import Any

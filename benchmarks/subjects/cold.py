@@ -4,8 +4,6 @@ Prints the seconds on the clock and of processors, with children, for the plan o
 preset, first with an empty cache and then with what that left there.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

@@ -6,8 +6,6 @@ must be no longer than the word, it must arrive, driven with 50 digits, and no s
 longer. Exits with 1 where one fails.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from argparse import Namespace

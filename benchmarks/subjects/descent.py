@@ -9,8 +9,6 @@ or others by `--map`; the last rows are tiles of one map, with the time for each
 over that of the first row.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from typing import Any

@@ -9,8 +9,6 @@ lengths is the optimum. Exits with 1 at the first answer that is not so, and pri
 again.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from argparse import Namespace

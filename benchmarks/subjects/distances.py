@@ -4,8 +4,6 @@ The costs of a sample of pairs are compared with those of `plan_many`: the exit 
 differs by more than 1e-9 of it.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 

@@ -4,8 +4,6 @@ A cell counts as missed if a flood fill of the true world, with the robot's radi
 the start and the robot's map does not know it in the end.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from collections import deque

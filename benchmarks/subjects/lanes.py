@@ -13,8 +13,6 @@ keep their ids when boxes of 0.3 to 0.8 m cover one free cell in a hundred. A gr
 that the robot cannot follow, or a crossing, is listed on stderr if it is ours.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from argparse import Namespace

@@ -6,8 +6,6 @@ occupied there; the disagreement is the share of the cells known by both that on
 the other one occupied.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ of the Intel log, at most so many as there are updates: each is added to a map w
 and the time is that of the update alone. The last table has each figure beside its aim.
 """
 
-from __future__ import annotations
-
 import time
 import warnings
 from argparse import Namespace

@@ -9,8 +9,6 @@ either. The last version is checked: at every level, arcs against boundaries rea
 alone.
 """
 
-from __future__ import annotations
-
 import itertools
 from argparse import Namespace
 from pathlib import Path

@@ -8,8 +8,6 @@ random places; all packed arrays are compared with those of a planner made anew.
 taken in one process.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from typing import Any, NamedTuple

@@ -5,8 +5,6 @@ pair, of a query as its user asks it: two ends in, a path out. Maps and pairs ar
 Paths of cells are compared with the octile optimum, paths at any angle with theirs.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from collections.abc import Callable

@@ -5,8 +5,6 @@ path, whatever it was planned by; clearance is the distance to the nearest occup
 along the paths, every 5 cm. Times are of one process, planners prepared.
 """
 
-from __future__ import annotations
-
 import time
 from argparse import Namespace
 from pathlib import Path

@@ -17,8 +17,6 @@ largest connected part, and for `no path` from two parts. Rows are presets; colu
                 map, another radius, a dropped closure; with digests as they were, and made anew
 """
 
-from __future__ import annotations
-
 import base64
 import copy
 import hashlib

@@ -6,8 +6,6 @@ size measures the memory: the growth of the resident set's peak, with the grid l
 The second measures the time.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -13,8 +13,6 @@
 of the half that the reference data has.
 """
 
-from __future__ import annotations
-
 import gzip
 import hashlib
 import itertools

@@ -17,8 +17,6 @@ maps 0. Pairs are drawn from the largest connected part. Columns:
     duplicates  queries that got another path when they were asked again, in reverse order
 """
 
-from __future__ import annotations
-
 from argparse import Namespace
 from typing import Any
 

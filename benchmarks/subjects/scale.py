@@ -18,8 +18,6 @@ the kernels loaded by a small map. It prints, for each step,
 Pairs are drawn from the largest part of free space, all over it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource

@@ -6,8 +6,6 @@ side by side; what loads it has answered a query on a small model before, so tha
 kernel is counted, and files are in the page cache.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

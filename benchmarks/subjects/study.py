@@ -13,8 +13,6 @@ maps are missing, the pages stay in DIR/docs, and no quote changes: it is not th
 maps are listed, and the others run; `python -m benchmarks fetch FOLDER` gets them.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -4,8 +4,6 @@ Needs `bwi_gdc` and `rose2_rooms` of the reference data (or HYBRIDNAV_DATA). Rou
 point of a room to another room, both drawn with a seed.
 """
 
-from __future__ import annotations
-
 import re
 from argparse import Namespace
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Write the maps of the project into a folder, as they are in `maps`."""
 
-from __future__ import annotations
-
 from argparse import Namespace
 from pathlib import Path
 

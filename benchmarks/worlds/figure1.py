@@ -1,7 +1,5 @@
 """The map of the paper's Fig. 1."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from benchmarks.worlds.world import FREE, OCCUPIED, UNEXPLORED, World

@@ -1,7 +1,5 @@
 """The office: a floor plan as data, painted and then seen through a noisy scanner."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Masks are drawn with sums, products, quotients and square roots only, which IEEE
 everywhere: sines differ in the last digit between processors, and the committed maps must not.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Generated worlds: the pixels of a map file, their frame and their thresholds; their files."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Predicates that rounding must not change, against fractions."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 from hypothesis import example, given

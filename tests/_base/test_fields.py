@@ -1,7 +1,5 @@
 """Shortest distances inside fields against scipy's."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

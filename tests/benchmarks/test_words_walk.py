@@ -1,7 +1,5 @@
 """A walker who knows only the words arrives on the shipped map, and not with other words."""
 
-from __future__ import annotations
-
 import pytest
 
 import hybridnav as hn

@@ -1,7 +1,5 @@
 """What `Blocked` closes: areas against single cells, arcs against reachability, and its errors."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import types

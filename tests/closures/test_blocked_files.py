@@ -1,7 +1,5 @@
 """Files of closed areas, and the option that takes them beside doors and rooms."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

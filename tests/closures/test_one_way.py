@@ -1,7 +1,5 @@
 """`OneWay`: lines snapped to sides, sides of doors and arcs, the moves that these forbid."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

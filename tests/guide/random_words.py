@@ -5,8 +5,6 @@ a cell.
 whose words are wrong.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import traceback

@@ -1,7 +1,5 @@
 """Alternatives by doors of planners by costs: order, overlap and stretch are measured in cost."""
 
-from __future__ import annotations
-
 import functools
 import json
 import math

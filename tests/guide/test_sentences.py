@@ -1,7 +1,5 @@
 """Sentences: one table a language, and no geometry."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

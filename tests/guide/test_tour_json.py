@@ -1,7 +1,5 @@
 """What a tour is as JSON: the keys of a plan, for the whole tour."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache

@@ -1,7 +1,5 @@
 """A path in words: every turn is told, to the right hand, where it lies, and nothing else."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

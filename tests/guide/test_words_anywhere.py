@@ -1,7 +1,5 @@
 """Words of routes exist on any map: by zones without walls, at its edge, in rooms of a cell."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

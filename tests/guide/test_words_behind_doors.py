@@ -1,7 +1,5 @@
 """Turns behind doors in words: the judge looks along the right angle of each door."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path as FilePath
 from typing import Any

@@ -1,7 +1,5 @@
 """Doors in words: which one it is, the side of each, and those beside a goal."""
 
-from __future__ import annotations
-
 import hybridnav as hn
 from tests.drawn_rooms import house, topology_of
 

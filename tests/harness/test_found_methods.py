@@ -1,7 +1,5 @@
 """Search methods that presets could name too, as methods of the harness."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`hybridnav.evaluate`: one call from maps and methods to a table."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Names as people type and sort them."""
 
-from __future__ import annotations
-
 import random
 import re
 

@@ -1,7 +1,5 @@
 """Files of models: altered, cut off, foreign, crafted; and a save that is killed."""
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -1,7 +1,5 @@
 """Models: what was prepared comes back bit by bit, from a file that is mapped into memory."""
 
-from __future__ import annotations
-
 import dataclasses
 import pickle
 from concurrent.futures import ThreadPoolExecutor

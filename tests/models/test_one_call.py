@@ -1,7 +1,5 @@
 """`hybridnav.plan` and `hybridnav.plot`: one call to a path, one to its picture."""
 
-from __future__ import annotations
-
 import pickle
 from pathlib import Path
 

@@ -9,8 +9,6 @@ left is short paths, which cross few sides. With factors all 1, 15 points cost 0
 exact optimum of `VisibilityGraph` on average, and 0.05 % at most.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

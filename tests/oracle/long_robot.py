@@ -1,7 +1,5 @@
 """A long robot among rooms: its poses against the raw cells, by shapely alone."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

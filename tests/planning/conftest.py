@@ -1,7 +1,5 @@
 """The office, and planners of it."""
 
-from __future__ import annotations
-
 import pytest
 
 import hybridnav as hn

@@ -1,7 +1,5 @@
 """The bound is a theorem: lower bound <= optimum <= cost for every preset, on little maps."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The bound is a theorem: on floors, in worlds, on real maps, and what the presets promise."""
 
-from __future__ import annotations
-
 import math
 import os
 import warnings

@@ -1,8 +1,6 @@
 """Cheapest plans at any angle: legal, priced and bounded as other programs say, and the same after
 changes of costs and maps as those of a planner that is made anew."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from typing import Any

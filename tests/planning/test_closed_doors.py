@@ -1,7 +1,5 @@
 """A door that is shut is shut: doors, rooms and arcs of any level, whoever plans."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import replace

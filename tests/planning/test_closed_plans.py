@@ -1,7 +1,5 @@
 """Plans round closed cells, areas, arcs and places, with every preset."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

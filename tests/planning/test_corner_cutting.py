@@ -1,7 +1,5 @@
 """Where corners may be cut: every status is true, though the topological map joins fewer cells."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Plans by costs: cheapest paths, their bounds and finish, closed cells, tours, refusals."""
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

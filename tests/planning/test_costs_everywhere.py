@@ -4,8 +4,6 @@ Whatever plans stands in one of the lists below, and a test compares them with w
 function that is new has to choose.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
 import re

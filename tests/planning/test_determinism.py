@@ -4,8 +4,6 @@ But for `ompl`: its paths depend on the time that a query has, and its process i
 a time (`test_ompl_plans.py` holds its seeds).
 """
 
-from __future__ import annotations
-
 import hashlib
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor

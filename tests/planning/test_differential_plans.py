@@ -1,7 +1,5 @@
 """Plans of a robot that turns on the spot and drives straight, with OMPL."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

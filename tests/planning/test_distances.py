@@ -1,7 +1,5 @@
 """Tables of distances, against plans of each pair and lengths by scipy."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Paths, rooms and places in CSV and GeoJSON, read again by programs that know nothing of ours."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

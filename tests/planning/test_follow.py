@@ -1,8 +1,6 @@
 """Planners that follow a changed map: optima by independent judges after each change, threads,
 interrupts, closures, and what is refused."""
 
-from __future__ import annotations
-
 import pickle
 import threading
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """Plans that stay on the path of an earlier one: legal, no dearer than allowed, and given up where
 something is closed on it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

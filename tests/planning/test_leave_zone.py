@@ -1,7 +1,5 @@
 """Starts in closed cells, and the way out of them, judged by Dijkstra of scipy."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

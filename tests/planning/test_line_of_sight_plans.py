@@ -1,7 +1,5 @@
 """Any-angle paths of every preset, by `smooth="line-of-sight"`."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

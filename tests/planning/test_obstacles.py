@@ -1,7 +1,5 @@
 """Closures are obstacles, off which the robot keeps its radius, unless they are `keepout`."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The preset `octile` answers what `grid-astar` answers, with a route and a bound without a gap."""
 
-from __future__ import annotations
-
 import threading
 import warnings
 from pathlib import Path

@@ -1,7 +1,5 @@
 """OMPL refinement: drivable paths inside the corridor, in time, reported honestly."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

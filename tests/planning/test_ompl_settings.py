@@ -1,7 +1,5 @@
 """Section `ompl` of a preset: what it takes, and that its tables are those of OMPL itself."""
 
-from __future__ import annotations
-
 import pytest
 import shapely
 

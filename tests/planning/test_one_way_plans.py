@@ -1,8 +1,6 @@
 """Plans past sides with a direction: their costs against scipy on directed moves, for every preset
 that plans on cells."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Methods of the user's own, `method: module:Class`, in presets."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Refiners of the user's own: what a preset may name, and what becomes of their answers."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Many queries in one call, with every preset."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle

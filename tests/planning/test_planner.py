@@ -1,7 +1,5 @@
 """The planner as its user meets it: statuses, frames, bounds, presets, routes, records."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Poses of plans by every preset: headings at start and goal, and no pose twice in a row."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import math

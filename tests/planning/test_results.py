@@ -1,7 +1,5 @@
 """Results of plans: what they hold."""
 
-from __future__ import annotations
-
 import gc
 import weakref
 from concurrent.futures import ThreadPoolExecutor

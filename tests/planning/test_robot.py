@@ -1,8 +1,6 @@
 """The preset `robot`: arcs that a differential robot can follow, inside free space, hardly dearer
 than the line that they round, with a bound on all paths."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Settings of presets that go together, and those that do not."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

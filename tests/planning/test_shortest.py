@@ -1,7 +1,5 @@
 """The preset `shortest`: any-angle paths that nothing is shorter than, between any points."""
 
-from __future__ import annotations
-
 import importlib
 import itertools
 import math

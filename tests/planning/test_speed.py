@@ -1,7 +1,5 @@
 """Speeds along a path: within every limit, and as fast as a linear program finds them."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

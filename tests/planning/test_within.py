@@ -1,7 +1,5 @@
 """Paths to the nearest point that can be reached, judged by shapely and a flooding of its own."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -5,8 +5,6 @@ A long tuple is made somewhere, and taken apart somewhere: both are looked for i
 numba knows the types of a kernel only where it has been called.
 """
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Ways up and down the pyramid, and the kernels between levels, against the receptive fields."""
 
-from __future__ import annotations
-
 import gc
 import itertools
 import os

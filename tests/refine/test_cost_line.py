@@ -1,8 +1,6 @@
 """Lines that settle where they cost least: legal, never dearer, with the same ends, near the
 cheapest; and their arcs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

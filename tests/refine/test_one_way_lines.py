@@ -1,8 +1,6 @@
 """Lines past sides with a direction: the exact test against moves and against crossings, and lines
 that are pulled taut."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Where one stands in a room, and the doors that lead somewhere."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

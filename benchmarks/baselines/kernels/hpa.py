@@ -4,8 +4,6 @@ A cluster is a square of `cluster_cells` x `cluster_cells` cells of the grid, cu
 and right rim. Moves are legal on the whole grid; inside a cluster both cells of a move lie in it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels of Thrun's map: critical lines on the grid, and the regions that take their cells."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.jit import njit

@@ -1,7 +1,5 @@
 """What is out of order until it is opened again: a journal beside the file of a map or building."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

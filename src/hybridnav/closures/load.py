@@ -2,8 +2,6 @@
 `load_blocked`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

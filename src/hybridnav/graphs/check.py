@@ -1,7 +1,5 @@
 """What is wrong with a graph that others have made, on its map."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

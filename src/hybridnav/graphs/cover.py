@@ -1,7 +1,5 @@
 """Rooms, doors, parts and points of free space that lanes have missed, and what is left out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Chains of cells on their way to straight edges, and the edges that shorten ways between these."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Iterator

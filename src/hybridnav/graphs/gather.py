@@ -2,8 +2,6 @@
 `SEVERITIES`, `Example` and `Finding`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from array import array

@@ -1,7 +1,5 @@
 """Nodes of a route graph, and paths that join its parts where free space does."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Graphs of others as methods of the harness."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hybridnav._base.clock import clock

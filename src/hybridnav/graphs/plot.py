@@ -1,7 +1,5 @@
 """The picture of a graph that others have made, with what is wrong with it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

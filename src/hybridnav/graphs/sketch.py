@@ -1,7 +1,5 @@
 """Straight edges set as a person would draw them: along walls, few, and crossing nowhere."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

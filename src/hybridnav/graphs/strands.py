@@ -1,7 +1,5 @@
 """Strands, lines of cells in the middle of corridors, and in halls as nets; plane segments."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Alternatives: paths between two points that pass other doors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Tours with several waypoints, described by rooms and doors."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, A
 Intelligence 99(1), 1998.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Two runs side by side: what changed for each method on each map, and whether by chance."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ are consistent when each path of one has its counterpart in the other. Nothing h
 own code: connectivity comes from scipy.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

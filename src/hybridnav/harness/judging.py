@@ -1,7 +1,5 @@
 """Judging answers: consistency, collisions, lengths, and the reference against other optima."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Container

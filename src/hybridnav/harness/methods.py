@@ -1,7 +1,5 @@
 """All methods of the harness by name: presets of our planner, and baselines."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import json

@@ -1,7 +1,5 @@
 """Names of methods: aliases, classes and the hashes of their sources."""
 
-from __future__ import annotations
-
 import difflib
 import hashlib
 import importlib

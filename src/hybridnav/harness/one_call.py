@@ -1,7 +1,5 @@
 """From maps and methods to a study in one call. Public: `evaluate`."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """All that one method did on one map, in arrays."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Outputs of a run beside its records: tables as CSV and Markdown, and the report."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Sequence

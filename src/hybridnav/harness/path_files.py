@@ -1,7 +1,5 @@
 """Recorded paths as files: bags, tables, trajectories, lines, path lists. Public: `load_paths`."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Recorded paths judged against the proved optimum between their own ends, and their detours."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Recorded paths as a method of the harness, beside live ones. Public: `RecordedMethod`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

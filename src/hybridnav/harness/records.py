@@ -1,7 +1,5 @@
 """Records: a JSON line for each query and method, append-only, resumable after any kill."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import json
 import os

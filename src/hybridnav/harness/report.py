@@ -1,7 +1,5 @@
 """The report of a run as one HTML text that opens without network: tables, charts, worst cases."""
 
-from __future__ import annotations
-
 import base64
 import io
 import math

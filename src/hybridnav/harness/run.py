@@ -2,8 +2,6 @@
 `write_records`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import shlex

@@ -1,7 +1,5 @@
 """What a run asks: maps with their costs, and pairs of start and goal."""
 
-from __future__ import annotations
-
 import hashlib
 import warnings
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Tables: CSV for machines, Markdown, HTML, LaTeX and plain text for people."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

@@ -1,7 +1,5 @@
 """A task: one method on one map, some pairs. It runs in any process and yields records."""
 
-from __future__ import annotations
-
 import math
 import traceback
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ one process prepares all methods that were made, and asks each pair of all of th
 that a seed shuffles, `repeat` times. Its tasks are resumed pair by pair too.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os

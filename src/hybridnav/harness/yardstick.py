@@ -2,8 +2,6 @@
 `AnyAngleOptimum`.
 """
 
-from __future__ import annotations
-
 from typing import Any, Literal, NamedTuple, get_args
 
 from hybridnav.errors import InvalidValueError, brief

@@ -2,8 +2,6 @@
 Public: `Bottleneck`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

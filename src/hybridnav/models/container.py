@@ -11,8 +11,6 @@ Offsets count from the first multiple of 64 behind the header. `hybridnav.models
 describes the contents of parts and the valid values of arrays.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import mmap

@@ -3,8 +3,6 @@
 Each feature of GeoJSON has a property `feature`: path, room, door, place or arc.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

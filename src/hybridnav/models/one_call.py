@@ -1,7 +1,5 @@
 """From a map to a path in one call. Public: `plan`."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Grids, rooms, pyramids and presets as parts of a model, and back."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from typing import Annotated, Any, TypeVar

@@ -1,7 +1,5 @@
 """Planners, maps and grids, written to files as models. Public: `save`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Protocol, runtime_checkable

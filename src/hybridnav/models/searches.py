@@ -1,7 +1,5 @@
 """Prepared meshes and graphs of planners as parts of a model, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

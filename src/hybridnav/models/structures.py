@@ -4,8 +4,6 @@ Limits of sizes are generous bounds on the sizes of real structures: they keep a
 from demanding memory.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Shortest paths that stay on an earlier one while that costs little more."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

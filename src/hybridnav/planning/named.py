@@ -1,7 +1,5 @@
 """Waypoints with names: their cells, and the best positions of waypoints in rooms."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

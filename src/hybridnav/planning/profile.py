@@ -4,8 +4,6 @@ A profile is a problem of its own: its private rooms are closed, its costs count
 width. What is planned under it is proved for that problem.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Speeds along a path: the profile by which a robot with limits arrives first."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields
 

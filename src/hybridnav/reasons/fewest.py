@@ -1,7 +1,5 @@
 """The fewest closures to open for a path."""
 
-from __future__ import annotations
-
 import heapq
 from collections import defaultdict
 from collections.abc import Iterable

@@ -2,8 +2,6 @@
 `prove`.
 """
 
-from __future__ import annotations
-
 import hashlib
 import math
 from dataclasses import dataclass

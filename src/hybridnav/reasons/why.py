@@ -2,8 +2,6 @@
 `Explanation` and `explain`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace

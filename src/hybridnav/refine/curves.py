@@ -2,8 +2,6 @@
 forwards and Reeds-Shepp both ways, and straight lines with turns on the spot.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass

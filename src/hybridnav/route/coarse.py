@@ -2,8 +2,6 @@
 search of the topological map by it; and the corridor along its route.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Tables of exact distances between many ends, by labels in a hierarchy or searches of cells."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol

@@ -1,7 +1,5 @@
 """Parts of proofs: trees of cheapest paths, corners with distances, and chains of walls."""
 
-from __future__ import annotations
-
 import base64
 import math
 import zlib

@@ -6,8 +6,6 @@ Blocks and self-loops make a tree for each component. Obstacles hang the trees o
 components below the face of the component that surrounds them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -4,8 +4,6 @@ The judge asks nothing of the package: rooms are what was painted, reachability 
 are by scipy, doors by a search over rooms.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

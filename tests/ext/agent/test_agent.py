@@ -1,7 +1,5 @@
 """Tools for programs, through the real protocol and HTTP, judged by what was painted."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import os

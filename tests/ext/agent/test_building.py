@@ -1,7 +1,5 @@
 """Tools for programs over the floors of a building, judged by graphs of rooms and plain plans."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Random buildings, and the optimal costs of their routes by code of their own."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

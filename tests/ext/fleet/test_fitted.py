@@ -1,7 +1,5 @@
 """Floors of drawn graphs are put on their maps, whatever one link of them says."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

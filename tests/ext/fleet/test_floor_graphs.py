@@ -1,7 +1,5 @@
 """Graphs of several floors: joined by links, and brought into one frame."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

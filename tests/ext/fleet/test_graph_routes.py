@@ -1,7 +1,5 @@
 """Routes on drawn graphs of buildings: the stated policy by networkx, and the answers counted."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Routes over floors: against Dijkstra on the joined floors, and every figure counted again."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Queries over floors: alternatives, closures, changes, names, statuses, words, copies, threads."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Why there is no route over floors: what would have to open, or where an end lies."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

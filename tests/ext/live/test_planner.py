@@ -1,8 +1,6 @@
 """A planner by the pyramid that follows the versions of an on-line one: its answers are those of a
 planner made anew, and no version is made dense for them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """A page in headless Chromium: what a person sees and clicks."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """A page of a little map, served for one test."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

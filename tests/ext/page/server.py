@@ -1,7 +1,5 @@
 """A page's server in a thread, and a client that sends what browsers and attackers would."""
 
-from __future__ import annotations
-
 import json
 import socket
 import threading

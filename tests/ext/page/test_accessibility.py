@@ -1,7 +1,5 @@
 """The page for people who do not see it, or use no mouse: names, order of focus, contrast."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

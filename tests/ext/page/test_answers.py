@@ -1,7 +1,5 @@
 """What the page's server answers: pictures, graphs, plans, files."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

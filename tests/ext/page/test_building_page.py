@@ -1,7 +1,5 @@
 """The page of a building in a browser: floors, routes over them, closures, names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Who goes, and what is closed for all, as people choose and see them on the page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Connections that say nothing or leave: the page answers, and the terminal is quiet."""
 
-from __future__ import annotations
-
 import json
 import socket
 import time

@@ -1,7 +1,5 @@
 """Changes of rooms, judged cell by cell with shapely."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Each export button, from the click to a file that others read; what fails is said on the page."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import json

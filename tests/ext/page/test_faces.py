@@ -1,7 +1,5 @@
 """The page as staff see it, on a laptop and on a phone, in both languages."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re

@@ -1,7 +1,5 @@
 """Rooms by name: what the server finds, where one stands, and the favourites that it keeps."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

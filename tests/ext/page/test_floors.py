@@ -1,7 +1,5 @@
 """What the server answers about buildings: floors, routes over them, rooms of each, files."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A page opens with the cells of its lowest floor; what takes long follows."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page in a browser, point by point: what people see and click."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What goes wrong on the page is said where people see it, and nothing they did is lost."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Names that people have typed survive two tabs, a killed server and a full disk."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """The page as one file: it opens by double click and asks nobody for anything."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

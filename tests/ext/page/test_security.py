@@ -1,7 +1,5 @@
 """Hostile requests end in a 4xx, and nothing outside the folder is read or written."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Iterator

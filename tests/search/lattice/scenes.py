@@ -1,7 +1,5 @@
 """Random maps with factors, for the tests of the lattice and of the lines that settle on it."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The bound on the cost of all paths at any angle, against the cost of paths that there are."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The lattice: as connected as the grid, legal lines, and the same lines after changes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

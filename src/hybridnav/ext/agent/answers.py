@@ -1,7 +1,5 @@
 """Answers for programs: rooms, routes, reasons, each small, in metres and names, with its proof."""
 
-from __future__ import annotations
-
 import math
 import tempfile
 import threading

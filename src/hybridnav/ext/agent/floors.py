@@ -1,7 +1,5 @@
 """What a program may ask over the floors of a building, where that is not what it asks one map."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, create_model

@@ -1,7 +1,5 @@
 """The table of functions as JSON over HTTP, on the server of the page, with its description."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Names and places as programs give them, and what an answer shows of a room."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -1,7 +1,5 @@
 """Floors brought into one frame, so that lifts lie above each other."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

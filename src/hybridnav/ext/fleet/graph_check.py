@@ -1,7 +1,5 @@
 """What is wrong with the graph of a building that others have made, and with its routes."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

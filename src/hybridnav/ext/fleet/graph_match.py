@@ -1,7 +1,5 @@
 """The graph of a building that others have made, matched to the floors and links of its maps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

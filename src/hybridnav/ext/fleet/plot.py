@@ -1,7 +1,5 @@
 """The picture of a building: a panel for each floor, with its links and the routes on it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

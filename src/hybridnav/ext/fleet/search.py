@@ -1,7 +1,5 @@
 """The search of routes over floors, which plans on a floor only where the best route may lead."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Callable, Iterator, Sequence

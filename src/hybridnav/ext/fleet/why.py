@@ -1,7 +1,5 @@
 """Why there is no route over floors: what is closed, where an end lies, or what walls enclose."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -2,8 +2,6 @@
 `CarriedCosts` and `carry_costs`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple

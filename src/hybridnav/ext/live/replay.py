@@ -1,7 +1,5 @@
 """Replays of maps that change, grid by grid or scan by scan, and their figures."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The rooms and doors that a change touches, found anew in a window of the map."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Readers of graphs in JSON: GeoJSON of Nav2's route server, and networkx's node-link form."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

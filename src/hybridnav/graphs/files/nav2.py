@@ -1,7 +1,5 @@
 """Writer of route graphs for Nav2's route server: GeoJSON."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ The rules are those of nav2_route 1.5.0 (Jazzy's 1.3.13 and Kilted's 1.4.2 have 
 `route_operation_client.hpp`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

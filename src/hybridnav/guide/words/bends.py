@@ -1,7 +1,5 @@
 """The line that a person walks: its legs, one inside each room, and its bends."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """What happens along a path: doors, waypoints, and bends, in order."""
 
-from __future__ import annotations
-
 import bisect
 import math
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Doors that a person sees from where it stands, or meets on its way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

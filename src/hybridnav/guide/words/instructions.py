@@ -1,7 +1,5 @@
 """From the legs of a path to instructions: what a person does, where, and past what."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

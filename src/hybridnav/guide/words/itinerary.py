@@ -1,7 +1,5 @@
 """Paths by rooms and doors: their legs, and instructions for a person."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary

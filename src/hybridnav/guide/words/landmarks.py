@@ -1,7 +1,5 @@
 """Doors and openings as a person meets them: how they lie to a path, and which are passed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterator
 from dataclasses import replace

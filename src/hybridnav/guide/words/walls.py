@@ -1,7 +1,5 @@
 """The walls of a room as a person follows them, with what leads out in each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 

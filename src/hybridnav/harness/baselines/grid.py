@@ -1,7 +1,5 @@
 """Planning on the grid alone: A*, Dijkstra, weighted A*."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

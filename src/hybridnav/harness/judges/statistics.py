@@ -2,8 +2,6 @@
 `PairedDifference`, `paired_difference` and `thrun_count`.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

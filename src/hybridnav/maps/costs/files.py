@@ -3,8 +3,6 @@
 and a filter mask.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -2,8 +2,6 @@
 Public: `ShapeWorld`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Methods of the user's own, which a preset names as `module:Class`."""
 
-from __future__ import annotations
-
 import math
 import threading
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A lower bound on the cost of all paths at any angle. Public: `slopes_of`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Random buildings of graphs: floors, names, facts, doors and links, in frames of their own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import networkx as nx

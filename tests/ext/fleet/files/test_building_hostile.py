@@ -1,7 +1,5 @@
 """Damaged and hostile files of buildings: one clear line, or a building, in bounded time."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

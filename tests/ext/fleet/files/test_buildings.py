@@ -1,7 +1,5 @@
 """Files of buildings: what they say, what is refused in one line, and models of buildings."""
 
-from __future__ import annotations
-
 import math
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Graphs of floors from their maps: names of rooms, doors on edges, ends of links in sight."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import shapely

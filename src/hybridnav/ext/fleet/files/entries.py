@@ -1,7 +1,5 @@
 """Entries of a file that describes a building, with the lines in which they stand."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields

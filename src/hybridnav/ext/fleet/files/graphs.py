@@ -1,7 +1,5 @@
 """Graphs of several floors: their files, whoever has made them, and those of our maps."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path

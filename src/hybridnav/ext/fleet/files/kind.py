@@ -1,7 +1,5 @@
 """Whether a file describes a building: a module that a plan on one map loads quickly."""
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reader of VDMA's Layout Interchange Format, version 1. Public: `export_lif`."""
 
-from __future__ import annotations
-
 import itertools
 import json
 from collections import Counter

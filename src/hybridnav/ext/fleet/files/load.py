@@ -1,7 +1,5 @@
 """Files of graphs, whoever has made them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hybridnav._base.files import printable

@@ -1,7 +1,5 @@
 """Reader of OpenStreetMap's XML of buildings: indoor tags, area graphs (osmAG), foot ways."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -2,8 +2,6 @@
 `Anchor`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Buildings from files: their YAML with maps and links, and models."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Floors of Open-RMF's files while they are read: vertices by number, lanes, doors, lifts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Writer of Open-RMF's navigation graphs: YAML of levels, lanes, doors and lifts."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections import Counter

@@ -2,8 +2,6 @@
 `By`, `MOST_GOALS` and `Step`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, get_args

@@ -2,8 +2,6 @@
 `laser_all_round`.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 

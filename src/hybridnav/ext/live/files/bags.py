@@ -1,7 +1,5 @@
 """Maps and scans of bags of ROS 1 and ROS 2; plans and maps into bags."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterator, Sequence

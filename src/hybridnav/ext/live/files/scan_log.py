@@ -1,7 +1,5 @@
 """Logs of laser scans: what is damaged, or does not follow, is left out and counted."""
 
-from __future__ import annotations
-
 import gzip
 import io
 import math

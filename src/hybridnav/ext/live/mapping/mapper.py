@@ -1,7 +1,5 @@
 """Occupancy grids that grow scan by scan. Public: `Mapper`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scans of a laser, with poses, and which follow from those before."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

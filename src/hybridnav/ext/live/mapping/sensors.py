@@ -1,7 +1,5 @@
 """Models of sensors, inverse and simulated."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
