@@ -179,7 +179,17 @@ def _not_asked(data: Data) -> list[StudyTable]:
         for name, part in data["parts"].items()
         for entry in part["unanswered"]
     ]
-    rows += [("all", name, "not installed", "", "", why) for name, why in data["missing"].items()]
+    rows += [
+        (
+            "all",
+            name,
+            "not installed",
+            "",
+            "",
+            f"{why.split(': pip')[0]}: [extras](howto/install.md)",
+        )
+        for name, why in data["missing"].items()
+    ]
     columns = ("part", "method", "what", "queries", "maps", "reason, on the first of these maps")
     return [StudyTable("", "not asked", "Not asked, or without an answer", columns, tuple(rows))][
         : len(rows)
