@@ -35,7 +35,8 @@ from hybridnav.graphs.attach import (
     placed_points,
     shortest_routes,
 )
-from hybridnav.graphs.judge import FreeSpace, excess_of
+from hybridnav.graphs.free_space import FreeSpace
+from hybridnav.graphs.judge import excess_of
 from hybridnav.graphs.kernels import least_along
 from hybridnav.graphs.sketch import settled
 from hybridnav.harness.tables import Row, to_markdown

@@ -8,7 +8,7 @@ import hybridnav as hn
 from hybridnav.graphs import build_lane_graph
 from hybridnav.graphs.attach import Network
 from hybridnav.graphs.cover import left_out
-from hybridnav.graphs.judge import FreeSpace
+from hybridnav.graphs.free_space import FreeSpace
 
 SIDE_M = 0.05
 

@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 import hybridnav as hn
 from hybridnav.graphs import build_lane_graph
 from hybridnav.graphs.drawing import drop_ends
-from hybridnav.graphs.judge import FreeSpace
+from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.kernels import spread, thinned
 from hybridnav.graphs.sketch import END, NOTHING, ROOM, Sketch
 from hybridnav.graphs.strands import Passage

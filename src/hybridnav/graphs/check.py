@@ -8,8 +8,8 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.graphs.attach import PlacedGraph
+from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.gather import MOST_EXAMPLES, Finding, Findings, Point, shown
-from hybridnav.graphs.judge import FreeSpace
 from hybridnav.graphs.lanes import DoorsPassed
 from hybridnav.graphs.one_way import against
 from hybridnav.graphs.waypoint_graph import WaypointGraph, add_components

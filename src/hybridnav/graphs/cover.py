@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridnav._base.trig import hypots
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
-from hybridnav.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
+from hybridnav.graphs.free_space import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.graphs.lanes import DoorsPassed
 from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch
 from hybridnav.graphs.waypoint_graph import RouteGraph

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hybridnav._base.typing import FloatArray, LongArray
-from hybridnav.graphs.judge import FreeSpace
+from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.waypoint_graph import components_of
 
 _TRIED = 8

@@ -18,10 +18,9 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.cover import Aims, complete
 from hybridnav.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.graphs.files.nav2_rules import MOST_ID
+from hybridnav.graphs.free_space import LEAST_AREA_M2, FreeSpace, Orientation, checked_position
 from hybridnav.graphs.joining import Nodes, missing_bends
-from hybridnav.graphs.judge import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.graphs.lanes import described
-from hybridnav.graphs.orientation import Orientation
 from hybridnav.graphs.route_messages import ids_of
 from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch, settled
 from hybridnav.graphs.strands import COVER, Layout, Passage, RoomAnchors, lines_of, strands_of

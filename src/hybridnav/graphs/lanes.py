@@ -14,8 +14,8 @@ from hybridnav._base.rows import unique_rows
 from hybridnav._base.trig import hypots
 from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
+from hybridnav.graphs.free_space import RIM_CELLS, FreeSpace
 from hybridnav.graphs.joining import Nodes
-from hybridnav.graphs.judge import RIM_CELLS, FreeSpace
 from hybridnav.graphs.kernels import least_along, least_widths
 from hybridnav.graphs.one_way import against
 from hybridnav.graphs.waypoint_graph import LANE, RouteGraph

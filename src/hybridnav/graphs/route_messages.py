@@ -15,7 +15,7 @@ from hybridnav._base.poses import Motion
 from hybridnav._base.trig import dist
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.attach import placed_points
-from hybridnav.graphs.judge import FreeSpace
+from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.waypoint_graph import RouteGraph, WaypointGraph
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from hybridnav._base.trig import cos, hypots, sin
 from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
-from hybridnav.graphs.judge import FreeSpace
+from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.kernels import least_along, spread, thinned
 from hybridnav.maps.clearance import clearance_cells
 

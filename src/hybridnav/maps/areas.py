@@ -16,11 +16,9 @@ from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.maps.cells import Box
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.occupancy import OccupancyGrid
-
-Box = tuple[int, int, int, int]
-
 
 _ROUNDING_CELLS = 1e-6
 

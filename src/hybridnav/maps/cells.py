@@ -29,3 +29,6 @@ DEFAULT_ROBOT_RADIUS_M = 0.25
 
 TOLERANCE = 1e-9
 """Greatest loss, or difference of two losses, that counts as rounding."""
+
+Box = tuple[int, int, int, int]
+"""First row, last row + 1, first column, last column + 1 of a box of cells."""

@@ -13,7 +13,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import OccupancyGrid
-from hybridnav.maps.areas import Box
+from hybridnav.maps.cells import Box
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from hybridnav._base.typing import LongArray
-    from hybridnav.maps.areas import Box
+    from hybridnav.maps.cells import Box
     from hybridnav.maps.costs import CostLayer
     from hybridnav.planning.costs import PlannerCosts
     from hybridnav.planning.planning import Planning

@@ -21,7 +21,7 @@ from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 
 if TYPE_CHECKING:
     from hybridnav.maps import OccupancyGrid
-    from hybridnav.maps.areas import Box
+    from hybridnav.maps.cells import Box
     from hybridnav.maps.costs import CostLayer
     from hybridnav.route.route import Route
     from hybridnav.search.directed import DirectedSides

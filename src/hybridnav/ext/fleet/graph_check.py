@@ -17,8 +17,9 @@ from hybridnav.ext.fleet.graph_match import MatchedGraph
 from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Position
 from hybridnav.ext.fleet.plan import BuildingPlan
 from hybridnav.graphs.check import GraphCheck, check_graph
+from hybridnav.graphs.free_space import LEAST_AREA_M2
 from hybridnav.graphs.gather import Finding, Findings, shown
-from hybridnav.graphs.judge import LEAST_AREA_M2, Excess, excess_of
+from hybridnav.graphs.judge import Excess, excess_of
 from hybridnav.graphs.waypoint_graph import (
     add_one_way,
     components_of,

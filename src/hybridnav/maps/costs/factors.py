@@ -17,8 +17,7 @@ from hybridnav._base.trig import exp
 from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
-from hybridnav.maps.areas import Box
-from hybridnav.maps.cells import MAX_CELLS
+from hybridnav.maps.cells import MAX_CELLS, Box
 from hybridnav.maps.clearance import FEW_ROWS, clearance_cells, squares_near
 
 UNIT_BITS = 14

@@ -15,7 +15,7 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.typing import AnyArray, BoolArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import Frame, OccupancyGrid
-from hybridnav.maps.areas import Box
+from hybridnav.maps.cells import Box
 from hybridnav.maps.checks import checked_cell, checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs.factors import (

@@ -13,7 +13,7 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps.areas import Box
+from hybridnav.maps.cells import Box
 from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.geometry import cells_of_line
 from hybridnav.planning.methods.grid import KnownMap
