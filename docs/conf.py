@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import hybridnav
 
 sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 
 from notebook_pages import execution_cache
+
+from hybridnav.cli.app import run
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 project = "hybridnav"
 author = "the hybridnav maintainers"
@@ -52,3 +58,17 @@ html_static_path = ["static"]
 html_css_files = ["wide.css"]
 html_show_sphinx = False
 html_copy_source = False
+
+
+def save_demo(app: Sphinx, problem: Exception | None) -> None:
+    """Write the page of the office that index.md leads to."""
+    if problem is None and app.builder.name == "html":
+        office = Path(__file__).parents[1] / "maps" / "office" / "office.yaml"
+        saved = str(app.outdir / "demo.html")
+        if run(["view", str(office), "--robot-radius", "0.25", "--save", saved]):
+            raise RuntimeError("the page of the office could not be saved")
+
+
+def setup(app: Sphinx) -> None:
+    """Register what the build does at its end."""
+    app.connect("build-finished", save_demo)

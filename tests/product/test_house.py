@@ -14,8 +14,8 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 64_483,
-    "lines": 102_215,
+    "code": 64_499,
+    "lines": 102_217,
     "files": 431,
     "code outside ext": 49_608,
     "lines of a file, most": 600,
@@ -29,7 +29,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 70_390,
+    "lines of tests": 70_406,
 }
 
 BUDGETS = {
@@ -39,7 +39,7 @@ BUDGETS = {
     "ext/agent": (2088, 6),
     "ext/fleet": (10313, 11),
     "ext/live": (7760, 10),
-    "ext/page": (3250, 7),
+    "ext/page": (3256, 7),
     "graphs": (6570, 6),
     "guide": (3682, 10),
     "harness": (9848, 11),
@@ -48,12 +48,12 @@ BUDGETS = {
     "planning": (6868, 9),
     "pyramid": (4445, 9),
     "reasons": (1242, 6),
-    "refine": (6147, 9),
+    "refine": (6107, 9),
     "rooms": (5700, 9),
     "route": (1047, 6),
     "search": (12040, 9),
     "topology": (716, 6),
-    "viz": (5330, 6),
+    "viz": (5332, 6),
 }
 """Lines of each package at most, and floors in it: 6 are wanted, where there are more none is
 added."""

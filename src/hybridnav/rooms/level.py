@@ -226,11 +226,6 @@ class Rooms:
         """
         return self._listing.is_listed[: len(self.names)]
 
-    @cached_property
-    def listed_cells(self) -> BoolArray:
-        """bool (rows, cols), free cells as measured, of rooms and other spaces that are listed."""
-        return np.append(self._listing.is_listed, np.False_)[self._listing.space_of]
-
     @property
     def begin_cells(self) -> BoolArray:
         """bool (rows, cols), free cells as measured, of rooms and other spaces in which a robot may

@@ -226,7 +226,7 @@ def plot_proof(
     >>> plot_proof(grid, proof).get_title()
     'heights from 0 (dark) to 2.7 m (yellow)'
     """
-    heights = _heights_of(grid, proof)
+    heights = _flat(grid, proof)
     words = f"heights from 0 (dark) to {proof['bound']:.1f} m (yellow)" if title is None else title
     ax = plot_map(grid, ax=ax, title=words, width_in=width_in)
     _draw_heights(ax, heights, np.inf)
@@ -262,7 +262,7 @@ def save_proof(
     >>> proof = hn.prove(hn.plan(grid, (0.5, 0.5), (2.0, 2.5), preset="octile"))
     >>> save_proof(grid, proof, "proof.gif", width_in=3.0)
     """
-    file, heights = checked_animation(path), _heights_of(grid, proof)
+    file, heights = checked_animation(path), _flat(grid, proof)
 
     def frames() -> Iterator[Figure]:
         for number in range(1, _BANDS + 1):
@@ -275,13 +275,19 @@ def save_proof(
     save_frames(frames(), [_FRAME_MS] * _BANDS + [_LAST_MS], file)
 
 
-def _heights_of(grid: OccupancyGrid, proof: dict[str, Any]) -> _Heights:
-    """Return the heights as `check_proof` computes and checks them."""
+def _flat(grid: OccupancyGrid, proof: dict[str, Any]) -> _Heights:
+    """Return the heights of a map whose rows lie along x."""
     if proof.get("kind") != "cells" or proof.get("costs") is not None or grid.frame.yaw_rad:
         raise InvalidValueError(
             "heights are drawn of a path of cells by lengths, on a map that is not turned, got a "
             f"proof of kind {proof.get('kind')!r:.40}: plan by the preset octile"
         )
+    return heights_of(grid, proof)
+
+
+def heights_of(grid: OccupancyGrid, proof: dict[str, Any]) -> _Heights:
+    """Return the heights of a proof of cells by lengths as `check_proof` computes and checks
+    them."""
     walls = np.pad(~grid.enterable(allow_unexplored=proof["allow_unexplored"]), 1)
     walls[[0, -1]] = walls[:, [0, -1]] = True
     for first, end in proof["closed"]:

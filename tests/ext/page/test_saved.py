@@ -1,12 +1,17 @@
 """The page as one file: it opens by double click and asks nobody for anything."""
 
+import io
 import json
 import re
+from base64 import b64decode
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
+import hybridnav as hn
 from tests.ext.page.browser import Shown, browsing
 
 
@@ -27,7 +32,7 @@ def _data(out: Path) -> Any:
 def test_the_file_holds_the_map_the_rooms_and_the_routes(cli: Any, folder: Path) -> None:
     done, out = _save(cli, folder, "--route", "0,4:9,12", "--route", "9,12:0,4")
     assert (done.code, done.err) == (0, "")
-    assert "2 routes" in done.out
+    assert "18 routes" in done.out  # 4 x 4 between the rooms, and these two
     data = _data(out)
     assert [room["name"] for room in data["floors"][0]["map"]["rooms"]["rooms"]] == [
         "a",
@@ -44,6 +49,43 @@ def test_the_file_holds_the_map_the_rooms_and_the_routes(cli: Any, folder: Path)
     ]
     lengths = [route["length_m"] for route in data["routes"]]
     assert lengths == pytest.approx([plan["length_m"] for plan in planned])
+
+
+def test_the_file_has_all_ways_between_rooms_and_a_proof_for_each_start(
+    cli: Any, folder: Path
+) -> None:
+    data = _data(_save(cli, folder)[1])
+    (floor,), matrix = data["floors"], data["matrix"]
+    names = [end["name"] for end in data["ends"]]
+    assert sorted(names) == ["a", "b", "c", "d"]
+    grid = hn.load_map(folder / "four.yaml", robot_radius_m=0.2)
+    points = [grid.frame.points_of_grid(end["point"][::-1]) for end in data["ends"]]
+    for number, row in enumerate(matrix):
+        for at, route in enumerate(row):
+            cost = hn.plan(grid, points[number], points[at]).cost
+            assert route["length_m"] == pytest.approx(cost, abs=1e-6)
+            first = [route["words"][language][0]["text"] for language in ("en", "de")]
+            assert all(names[number] in text for text in first)
+            assert first[0] != first[1]
+        most, goal = floor["heights"][str(number)]
+        proved = hn.plan(grid, points[number], points[names.index(goal)], preset="octile").cost
+        assert most == pytest.approx(proved, abs=0.1)
+        tile = floor["tiles"][f"heights-{number}"]["found"]["light/0/0/0"]
+        drawn = np.array(Image.open(io.BytesIO(b64decode(tile.partition(",")[2]))))
+        assert {*np.unique(drawn[..., 3])} == {0, 255}
+        at_col, at_row = map(int, data["ends"][number]["point"])
+        assert tuple(drawn[at_row, at_col, :3]) == (68, 1, 84)  # the dark end of viridis
+    assert data["routes"][0]["length_m"] == max(each["length_m"] for row in matrix for each in row)
+
+
+@pytest.mark.full
+def test_the_office_with_all_its_routes_stays_below_three_megabytes(
+    cli: Any, tmp_path: Path
+) -> None:
+    office, out = Path(__file__).parents[3] / "maps/office/office.yaml", tmp_path / "office.html"
+    cli("view", office, "--robot-radius", 0.25, "--save", out)
+    assert len(_data(out)["matrix"]) == 23
+    assert out.stat().st_size < 3e6
 
 
 def test_the_file_names_no_address_and_holds_no_path(cli: Any, folder: Path) -> None:
@@ -95,13 +137,47 @@ def test_the_file_opens_in_a_browser_without_a_server(cli: Any, folder: Path) ->
         assert not shown.page.locator("#rename").is_visible()
         shown.page.locator(".route-card").nth(2).click()
         assert shown.text("#status").startswith("No route: ")
-        assert not shown.page.locator("#route-title").is_visible()  # nothing stands below it
         for colours in ("map", "level", "rooms"):
             shown.page.select_option("#colours", colours)
         shown.page.select_option("#theme", "dark")
         shown.page.check("#show-graph")
         shown.page.click("#zoom-in")
         shown.wait("document.getElementById('map').dataset.waiting === '0'")
+        assert shown.errors == []
+        assert all(url.startswith(("file:", "data:")) for url in shown.requests)
+
+
+@pytest.mark.full
+def test_rooms_are_typed_and_clicked_with_the_network_off(cli: Any, folder: Path) -> None:
+    with browsing() as browser:
+        data = _data(out := _save(cli, folder)[1])
+        names = [end["name"] for end in data["ends"]]
+        shown = Shown(browser.new_context(offline=True), out.as_uri(), "staff")
+        assert shown.length_m == data["routes"][0]["length_m"]
+        for which, text in (("start", "b"), ("goal", "C ")):
+            shown.page.fill(f"#{which}", text)
+            shown.page.wait_for_selector(f"#{which}-list[data-asked='{text}'] li")
+            shown.page.keyboard.press("Enter")
+        shown.wait_plan(1)
+        route = data["matrix"][names.index("b")][names.index("c")]
+        assert shown.length_m == route["length_m"]
+        assert shown.text("#words").splitlines()[-1] == route["words"]["en"][-1]["text"]
+        shown.page.select_option("#language", "de")
+        shown.wait_text("#words", route["words"]["de"][-1]["text"])
+        for which, name in (("start", "d"), ("goal", "a")):  # a click means the room around it
+            col, row = data["ends"][names.index(name)]["point"]
+            shown.click(col + 2, row - 2)
+            shown.wait(f"document.getElementById('{which}').value === '{name}'")
+        shown.wait_plan(3)  # the other language was one too
+        assert shown.length_m == data["matrix"][names.index("d")][names.index("a")]["length_m"]
+        shown.page.select_option("#face", "robot")
+        shown.page.check("#show-heights")
+        shown.wait_text("#legend", "Kein Schritt steigt mehr")
+        shown.wait_painted()
+        assert data["floors"][0]["heights"][str(names.index("d"))][1] in shown.text("#legend")
+        shown.page.fill("#goal", "1, 2")  # no room: the file has no way to it
+        shown.page.keyboard.press("Enter")
+        shown.wait_text("#status", "Diese Datei hat die Wege")
         assert shown.errors == []
         assert all(url.startswith(("file:", "data:")) for url in shown.requests)
 

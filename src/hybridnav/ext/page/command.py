@@ -256,8 +256,8 @@ def _save(site: Site, path: Path, routes: Sequence[str]) -> None:
             for number, point in _ends(text, site.names)
         )
         queries.append(PlanQuery(start=start, goal=goal, preset=site.routes().presets[0]))
-    save_page(site, path, queries)
-    counts = f"{path.stat().st_size / 1e6:.1f} MB, {len(routes)} routes"
+    n_routes = save_page(site, path, queries)
+    counts = f"{path.stat().st_size / 1e6:.1f} MB, {n_routes} routes"
     floors = f"{len(site.names)} floors, " if site.names[0] else ""
     answer(f"page       {printable(path)}, {floors}{counts}\n")
 

@@ -301,7 +301,6 @@ class PagePlanning:
                 tour_of(planner, [each.result], ask.named_ends(query, (start, goal))),
                 query.language,
             )
-            | {"overlap": round(each.overlap, 3)}
             for each in found
         ]
         return {"routes": routes, "complete": found.complete, "note": found.note}
@@ -348,8 +347,7 @@ class PagePlanning:
         return ask.facts_of(result, parts) | {"length_m": ask.finite(length_m)}
 
     def _itinerary(self, tour: Tour, language: str) -> dict[str, Any]:
-        """Return rooms, doors and words of a plan, and the places that it passes."""
-        route = tour.results[0].route
+        """Return rooms, doors and words of a plan."""
         return {
             "legs": [
                 {
@@ -360,5 +358,4 @@ class PagePlanning:
                 for leg in tour.legs
             ],
             "words": ask.lines_of(tour.instructions, language, [(0, self.grid)]),
-            "places": list(route.places) if route is not None else [],
         }

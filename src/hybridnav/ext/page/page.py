@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from importlib.resources import files
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,15 +18,16 @@ from hybridnav._base.files import printable, replace_file
 from hybridnav._base.typing import PathLike
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import map_facts
-from hybridnav.ext.page.requests import PartQuery, PlanQuery
+from hybridnav.ext.page.requests import FloorPoint, PartQuery, PlanQuery, Stand, in_metres
 from hybridnav.ext.page.session import Session
 from hybridnav.ext.page.site import Site
-from hybridnav.ext.page.tiles import TILE, MapLayer, Theme, hex_colours, map_layer
+from hybridnav.ext.page.tiles import TILE, MapLayer, Theme, heights_layer, hex_colours, map_layer
 from hybridnav.graphs import build_lane_graph
 from hybridnav.graphs.files import export_nav2
 from hybridnav.guide.words import languages
 from hybridnav.maps import OccupancyGrid
 from hybridnav.models import export_path, export_rooms, save
+from hybridnav.reasons import prove
 
 _NAMES = (
     *("texts.js", "scene.js", "draw.js", "link.js", "route.js", "closures.js", "floors.js"),
@@ -92,11 +94,17 @@ def _plain(module: str) -> str:
 
 _MOST_CELLS = 4_000_000
 """Cells of a picture of all floors in the file; larger maps are halved until they have no more."""
+_MOST_ENDS = 24
+"""Rooms of all floors, the largest, between which a file has all routes."""
+_Facts = dict[str, Any]
 _THEMES: tuple[Theme, ...] = ("light", "dark")
 
 
-def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> None:
-    """Write the page with its maps, their rooms and some routes into one HTML file.
+def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> int:
+    """Write the page with its maps, their rooms, and routes between them into one HTML file.
+
+    It has the routes between the 24 largest rooms, in all languages, and for each start on a map
+    the heights of the proof of its farthest goal.
 
     Parameters
     ----------
@@ -105,7 +113,12 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
     path
         The file; one that exists is replaced.
     queries
-        The routes that it holds, planned now.
+        Further routes, which it shows first.
+
+    Returns
+    -------
+    int
+        How many routes it has.
 
     Raises
     ------
@@ -121,15 +134,27 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
     >>> model = hn.load("figure1.hnm")
     >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
     >>> save_page(Site.of_map(Session(model, topology, model.fitted(None))), "page.html")
+    4
     >>> Path("page.html").read_text()[:15]
     '<!doctype html>'
     """
     most = _MOST_CELLS // len(site.sessions)
+    ends = _ends(site)
+    asked = [_between(site, *pair) for pair in product(ends, ends)]
+    found = [_in_languages(site, query) for query in asked]
+    matrix = [found[at : at + len(ends)] for at in range(0, len(found), len(ends) or 1)]
+    if ends and not queries:
+        queries = [asked[max(range(len(found)), key=lambda at: _length_m(found[at]))]]
+    floors = [_map(session, most) for session in site.sessions]
+    if len(floors) == 1:
+        _add_heights(floors[0], site.sessions[0], ends, matrix)
     data: dict[str, Any] = {
         "map": site.describe(),
-        "floors": [_map(session, most) for session in site.sessions],
+        "floors": floors,
+        "ends": ends,
+        "matrix": matrix,
         "routes": [
-            query.model_dump(include={"start", "goal", "preset"}) | site.routes(query).plan(query)
+            query.model_dump(include={"start", "goal", "preset"}) | _in_languages(site, query)
             for query in queries
         ],
     }
@@ -137,6 +162,61 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
         replace_file(Path(path), whole_page(data).encode())
     except OSError as error:
         raise MapError(f"page {printable(path)}: cannot write: {error.strerror}") from None
+    return len(found) + len(queries)
+
+
+def _ends(site: Site) -> list[dict[str, Any]]:
+    """Return the rooms between which a file has all routes; none if the preset samples."""
+    preset = site.routes().presets[0]
+    if any(one.planning.planner(preset).preset.planner.sampling for one in site.sessions):
+        return []
+    found = []
+    for number, session in enumerate(site.sessions):
+        rooms = session.planning.topology.rooms
+        named = zip(rooms.names, rooms.areas_m2.tolist(), rooms.fits & rooms.is_listed, strict=True)
+        found += [(-area, number, name) for name, area, is_end in named if is_end]
+    return [
+        {"floor": number} | site.sessions[number].stand(Stand(name=name))
+        for _, number, name in sorted(found)[:_MOST_ENDS]
+    ]
+
+
+def _between(site: Site, one: dict[str, Any], other: dict[str, Any]) -> PlanQuery:
+    keys = ("floor", "point", "name")
+    start, goal = (FloorPoint(**{key: end[key] for key in keys}) for end in (one, other))
+    return PlanQuery(start=start, goal=goal, preset=site.routes().presets[0])
+
+
+def _length_m(route: dict[str, Any]) -> float:
+    return route["length_m"] or 0.0
+
+
+def _in_languages(site: Site, query: PlanQuery) -> dict[str, Any]:
+    """Return a plan, what it says by language."""
+    plans = {
+        code: site.routes(query).plan(query.model_copy(update={"language": code}))
+        for code in languages()
+    }
+    said = {key: {code: plan[key] for code, plan in plans.items()} for key in ("words", "why")}
+    return {**next(iter(plans.values())), **said}
+
+
+def _add_heights(floor: _Facts, session: Session, ends: list[_Facts], matrix: Any) -> None:
+    """Add to what a file has of a floor the heights of a proof for each end: that of the path of
+    cells to its farthest goal."""
+    floor["heights"] = {}
+    planner, closed = session.planning.planner("octile"), session.out_of_order()
+    if planner.costs is not None:
+        return
+    for number, (end, routes) in enumerate(zip(ends, matrix, strict=True)):
+        farthest, route = max(zip(ends, routes, strict=True), key=lambda pair: _length_m(pair[1]))
+        if not _length_m(route):
+            continue
+        start, goal = (in_metres(each["point"], session.grid) for each in (end, farthest))
+        proof = prove(planner.plan(start, goal, blocked=closed))
+        layer, most = heights_layer(session.grid, proof)
+        floor["heights"][number] = [most, farthest["name"]]
+        floor["tiles"][f"heights-{number}"] = _tiles(layer, _MOST_CELLS, is_overlay=True)
 
 
 def _map(session: Session, most_cells: int) -> dict[str, Any]:
@@ -146,25 +226,28 @@ def _map(session: Session, most_cells: int) -> dict[str, Any]:
     return {
         "map": session.describe(),
         "graph": session.graph(str(place)),
+        "rings": session.outlines()["rings"],
         "tiles": {name: _tiles(session.layer(layer), most_cells) for name, layer in layers.items()},
     }
 
 
-def _tiles(layer: MapLayer, most_cells: int) -> dict[str, Any]:
-    """Return the tiles of a layer as addresses that hold their data, for both themes."""
+def _tiles(layer: MapLayer, most_cells: int, *, is_overlay: bool = False) -> dict[str, Any]:
+    """Return the tiles of a layer as addresses that hold their data, for both themes; an overlay is
+    equal in both, and of one size."""
     rows, cols = layer.index.shape
     first = 0
     while (rows >> first) * (cols >> first) > most_cells:
         first += 1
     found = {}
-    for zoom in range(first, max(layer.n_zooms, first + 1)):
+    last = first if is_overlay else max(layer.n_zooms - 1, first)
+    for zoom in range(first, last + 1):
         side = TILE << zoom
-        for theme in _THEMES:
+        for theme in _THEMES[:1] if is_overlay else _THEMES:
             for row in range(-(-rows // side)):
                 for col in range(-(-cols // side)):
-                    content = base64.b64encode(layer.png(zoom, row, col, theme)).decode()
+                    content = base64.b64encode(layer.png(zoom, row, col, theme, 9)).decode()
                     found[f"{theme}/{zoom}/{row}/{col}"] = f"data:image/png;base64,{content}"
-    return {"first": first, "found": found}
+    return {"first": first, "last": last, "found": found}
 
 
 # Files that the page hands out: route graph, model, path, rooms.

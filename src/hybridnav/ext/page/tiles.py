@@ -7,7 +7,7 @@ from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib import colormaps
@@ -19,6 +19,7 @@ from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.costs import CostLayer
 from hybridnav.pyramid import Level
 from hybridnav.viz import style
+from hybridnav.viz.moving import heights_of
 from hybridnav.viz.places import colour_vertices
 
 Theme = Literal["light", "dark"]
@@ -36,6 +37,8 @@ _DARK_STRENGTH = 0.48
 _COST_ALPHA = 215
 _CLOSED_BY_COSTS = (123, 50, 148, 230)
 _DECADE = 10.0
+_BANDS = 24
+"""Colours of heights."""
 
 
 def palette(theme: Theme) -> ByteArray:
@@ -75,7 +78,7 @@ class MapLayer:
         longest = max(self.index.shape)
         return 1 + max(0, int(np.ceil(np.log2(longest / TILE))))
 
-    def png(self, zoom: int, row: int, col: int, theme: Theme) -> bytes:
+    def png(self, zoom: int, row: int, col: int, theme: Theme, compress_level: int = 1) -> bytes:
         """Return a tile as PNG, its first row the one of the lowest y.
 
         `zoom`: how often the map is halved, from 0 to `n_zooms` - 1; `row`, `col`: number of the
@@ -84,7 +87,8 @@ class MapLayer:
         """
         self._check(zoom, row, col)
         with io.BytesIO() as file:
-            Image.fromarray(self._tile(zoom, row, col, theme)).save(file, "PNG", compress_level=1)
+            picture = Image.fromarray(self._tile(zoom, row, col, theme))
+            picture.save(file, "PNG", compress_level=compress_level)
             return file.getvalue()
 
     def _check(self, zoom: int, row: int, col: int) -> None:
@@ -202,6 +206,19 @@ def costs_layer(grid: OccupancyGrid, costs: CostLayer) -> tuple[MapLayer, float]
     if costs.closed is not None:
         index[costs.closed & free] = 255
     return MapLayer(index, {"light": table, "dark": table}), most
+
+
+def heights_layer(grid: OccupancyGrid, proof: dict[str, Any]) -> tuple[MapLayer, float]:
+    """Return the overlay of the heights of a proof in bands, and the greatest; see
+    `viz.plot_proof`."""
+    metres, (row, col) = heights_of(grid, proof).metres, proof["box"][:2]
+    most = float(np.nanmax(metres))
+    index = np.zeros(np.add(grid.shape, 2), np.uint8)
+    bands = np.nan_to_num(1 + np.clip(metres / most, 0, 1) * (_BANDS - 1))
+    index[row : row + len(metres), col : col + metres.shape[1]] = bands
+    table = np.zeros((_BANDS + 1, 4), np.uint8)
+    table[1:] = np.round(colormaps["viridis"](np.linspace(0, 1, _BANDS)) * 255)
+    return MapLayer(index[1:-1, 1:-1], {"light": table}), round(most, 1)
 
 
 def hex_colours(theme: Theme) -> Sequence[str]:

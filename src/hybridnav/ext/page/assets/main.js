@@ -100,7 +100,7 @@ const handlers = {
     else await page.names.drop(held, point);
   })(),
   click: (at) => reported(async () => {
-    if (!page.link.isLive || !page.map.ready) return;
+    if (!page.map.ready || !(page.link.isLive || page.link.data.ends.length)) return;
     const point = page.scene.toGrid(at);
     const { routes, closures } = page;
     if (page.mode === "route") await (routes.hasEnds && routes.lightAt(at) ? null : routes.clicked(point));
@@ -186,6 +186,7 @@ function connectView() {
   for (const id of ["show-names", "show-doors"]) on(id, "change", () => { scene.draw(); pictures.showLegend(); });
   on("show-all", "change", () => { page.names.list(); scene.draw(); });
   on("show-costs", "change", () => pictures.showCosts());
+  on("show-heights", "change", () => pictures.showHeights());
   on("theme", "change", () => pictures.useTheme());
   on("floor", "change", () => showFloor(Number(byId("floor").value)));
   on("floor-up", "click", () => showFloor(page.floors.at + 1));
@@ -378,7 +379,8 @@ async function begin() {
   page.names = new Names(page);
   page.scene.painters.push((scene) => page.pictures.paint(scene));
   document.documentElement.classList.toggle("saved", !page.link.isLive);
-  if (!page.link.isLive) page.routes.take(page.link.data.routes);
+  document.documentElement.classList.toggle("mute", !page.link.isLive && !page.link.data.ends.length);
+  if (!page.link.isLive) page.routes.take(page.link.routes);
   describe();
   listChoices();
   steer(page.scene, handlers);

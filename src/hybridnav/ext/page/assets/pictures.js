@@ -10,6 +10,7 @@ const systemTheme = matchMedia("(prefers-color-scheme: dark)");
 export class Pictures {
   #graph = null;
   #costs = null;
+  #heights = null; // that are shown: the greatest in metres, and the goal of their proof
   #asked = 0;
 
   constructor(page) {
@@ -71,6 +72,19 @@ export class Pictures {
     scene.draw();
   }
 
+  // In a saved page: the heights of the proof of a start, which it has for the rooms of a map.
+  async showHeights() {
+    const { scene, link, routes } = this.page;
+    if (link.isLive) return;
+    const heights = await link.get("heights");
+    this.byId("heights-row").hidden = !Object.keys(heights).length;
+    const number = link.numberOf(routes.ends.start);
+    this.#heights = this.byId("show-heights").checked ? heights[number] : null;
+    scene.overlay = this.#heights ? `heights-${number}` : null;
+    this.showLegend();
+    scene.draw();
+  }
+
   showLegend() {
     const { map, scene, floors } = this.page;
     const colours = map.colours[scene.theme];
@@ -94,6 +108,7 @@ export class Pictures {
     }
     const most = this.#costs?.most;
     if (most) entries.push([`<defs><linearGradient id="c"><stop stop-color="#fff6b5"/><stop offset="1" stop-color="#b10026"/></linearGradient></defs>${box("url(#c)")}`, t("costs-to", Number(most.toPrecision(3)))]);
+    if (this.#heights) entries.push([`<defs><linearGradient id="h"><stop stop-color="#440154"/><stop offset=".5" stop-color="#21918c"/><stop offset="1" stop-color="#fde725"/></linearGradient></defs>${box("url(#h)")}`, t("heights-to", ...this.#heights)]);
     this.byId("legend").replaceChildren(...entries.map(([content, text]) => element("li", {}, picture(content), text)));
   }
 

@@ -102,7 +102,9 @@ export class Routes {
   // For people a click means the room, and a free place in it; a robot stands where it is put.
   async putEnd(which, point) {
     const { floors, fields } = this.page;
-    const end = settings.face === "staff" && await fields.endOf({ floor: floors.at, point });
+    const { isLive } = this.page.link;
+    const end = (settings.face === "staff" || !isLive) && await fields.endOf({ floor: floors.at, point });
+    if (!end && !isLive) return this.page.say(t("not-in-file"), true);
     if (!end) return this.setEnd(which, point);
     this.ends[which] = end;
     this.showEnds();
@@ -168,7 +170,8 @@ export class Routes {
   // A few requests at a time, so that none waits for the way of another; of those that come
   // meanwhile only the last is sent, and an answer older than the one shown is dropped.
   async plan(isBrief = false) {
-    if (!this.hasEnds) {
+    if (this.#isKept) this.take(this.page.link.routes);
+    if (!this.hasEnds || this.#isKept) {
       this.show();
       return;
     }
@@ -246,12 +249,21 @@ export class Routes {
   // Routes of a saved page have ends of their own.
   #takeEnds() {
     const { start, goal } = this.routes[this.chosen] ?? {};
-    if (start) this.ends = { start, goal };
+    if (!start) return;
+    for (const end of [start, goal]) end.text = end.name ? this.page.fields.textOf(end.floor, end.name) : "";
+    this.ends = { start, goal };
+    this.showEnds();
   }
 
   take(routes) {
     this.routes = routes;
     this.#takeEnds();
+  }
+
+  // Whether a route of a saved page is shown, which needs no plan.
+  get #isKept() {
+    const { start, goal } = this.routes[this.chosen] ?? {};
+    return Boolean(start) && this.ends.start === start && this.ends.goal === goal;
   }
 
   // --- the panel
@@ -261,6 +273,7 @@ export class Routes {
     const { canvas, scene } = this.page;
     canvas.dataset.plans = this.#plans;
     canvas.dataset.length = route?.length_m ?? "";
+    this.page.pictures.showHeights();
     scene.draw();
     this.#showFigures(route);
     this.byId("optimum").disabled = !this.hasEnds;

@@ -185,8 +185,7 @@ export class Scene {
   }
 
   #paintTiles(ground, layer, isOpaque) {
-    const last = this.map.zooms - 1;
-    const first = this.link.firstZoom(layer);
+    const { first, last } = this.link.zooms(layer, this.map.zooms - 1);
     const wanted = Math.floor(-Math.log2(this.scale * this.ratio));
     const zoom = Math.max(first, Math.min(Math.max(last, first), wanted));
     if (isOpaque && zoom < last) this.#paintZoom(ground, layer, last); // seen until finer tiles arrive
