@@ -133,6 +133,15 @@ def test_a_notebook_has_no_empty_cell_and_installs_nothing(path: Path) -> None:
     assert all(cell.strip() for cell in cells)
     assert not any("pip install --quiet" in cell for cell in cells)
     assert "docs/howto/install.md" in cells[0]
+    assert not any("ipywidgets" in cell for cell in cells)  # matplotlib's player has no need of it
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_ends_with_three_questions(path: Path) -> None:
+    last = nbformat.read(path, as_version=4).cells[-1].source
+    asked = last.partition("## Three questions\n")[2].lstrip().partition("\n\n")[0].splitlines()
+    assert len(asked) == 3
+    assert all(line.startswith("* ") and "?" in line for line in asked)
 
 
 def test_every_page_that_names_an_extra_points_to_the_one_on_installing() -> None:
