@@ -284,7 +284,7 @@ _FINDINGS = tuple(
         ),
         (
             "`paper` comes down the levels of the pyramid: it expands {paper_work} % of what A\\* "
-            "expands, fields and cells together, and is {paper_speed} than A\\* by the median of "
+            "expands, fields and cells together. It is {paper_speed} than A\\* by the median of "
             "the ratios of times, {paper_means} by mean times."
         ),
         (
