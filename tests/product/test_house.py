@@ -14,8 +14,8 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 64_499,
-    "lines": 102_217,
+    "code": 64_540,
+    "lines": 102_280,
     "files": 431,
     "code outside ext": 49_608,
     "lines of a file, most": 600,
@@ -25,11 +25,11 @@ LIMITS = {
     "files visited by paper": 55,
     "lines visited by paper": 14_100,
     "modules of a plan and a picture": 145,
-    "imports, % of the code": 9.1,
+    "imports, % of the code": 8.9,
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 70_406,
+    "lines of tests": 70_480,
 }
 
 BUDGETS = {
@@ -51,7 +51,7 @@ BUDGETS = {
     "refine": (6107, 9),
     "rooms": (5700, 9),
     "route": (1047, 6),
-    "search": (12040, 9),
+    "search": (12060, 9),
     "topology": (716, 6),
     "viz": (5332, 6),
 }
