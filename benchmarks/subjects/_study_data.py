@@ -15,7 +15,7 @@ from hybridnav.harness.columns import (
     figures,
     loss_columns,
 )
-from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.names import REFERENCE
 from hybridnav.harness.outcome import MapQuery, Outcome
 from hybridnav.harness.output import rows_of_methods
 from hybridnav.harness.records import Record

@@ -16,8 +16,8 @@ from benchmarks.rivals import needed_package
 from benchmarks.subjects._study_maps import StudyMap
 from hybridnav._base.files import replace_file
 from hybridnav.errors import HybridNavError, InvalidValueError
-from hybridnav.harness.methods import BASELINES, REFERENCE, preset_spec
-from hybridnav.harness.names import NamedMethod, class_of
+from hybridnav.harness.methods import preset_spec
+from hybridnav.harness.names import BASELINES, REFERENCE, NamedMethod, class_of
 from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.planning import Preset, load_preset
 

@@ -29,7 +29,7 @@ from benchmarks.subjects._study_run import (
 )
 from benchmarks.subjects._study_tables import tables_of
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import BASELINES
+from hybridnav.harness.names import BASELINES
 from hybridnav.harness.tables import text_of
 from hybridnav.planning import load_preset
 from tests.benchmarks.recomputed import REFERENCE, Recomputed

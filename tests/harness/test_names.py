@@ -13,8 +13,8 @@ import pytest
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import load_study, rows_of_study, to_frame
 from hybridnav.harness.compare import compare_runs
-from hybridnav.harness.methods import BASELINES, baseline_spec
-from hybridnav.harness.names import NamedMethod, class_of, source_hash
+from hybridnav.harness.methods import baseline_spec
+from hybridnav.harness.names import BASELINES, NamedMethod, class_of, source_hash
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, methods_of, write_records

@@ -9,7 +9,8 @@ from dataclasses import replace
 import pytest
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import MethodSpec, baseline_spec, preset_spec
+from hybridnav.harness.methods import baseline_spec, preset_spec
+from hybridnav.harness.names import MethodSpec
 from hybridnav.harness.records import (
     RECORDS_FILE,
     RecordFile,

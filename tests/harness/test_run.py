@@ -19,7 +19,7 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.harness import workers
 from hybridnav.harness.analysis import load_study
 from hybridnav.harness.compare import compare_runs
-from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.names import REFERENCE
 from hybridnav.harness.output import write_outputs
 from hybridnav.harness.records import RECORDS_FILE, read_records
 from hybridnav.harness.run import RunSettings, write_records

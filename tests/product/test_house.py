@@ -42,7 +42,7 @@ BUDGETS = {
     "ext/page": (3256, 7),
     "graphs": (6570, 6),
     "guide": (3682, 10),
-    "harness": (9848, 11),
+    "harness": (9848, 9),
     "maps": (5319, 6),
     "models": (2152, 6),
     "planning": (6868, 9),

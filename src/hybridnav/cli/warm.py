@@ -258,7 +258,7 @@ def compile_model() -> None:
 def compile_harness() -> None:
     """Compile what evaluates presets and the package's own baselines, and judges paths."""
     from hybridnav.harness import RunSettings, write_records  # noqa: PLC0415 - on demand
-    from hybridnav.harness.methods import BASELINES  # noqa: PLC0415
+    from hybridnav.harness.names import BASELINES  # noqa: PLC0415
 
     own = (name for name, (path, _) in BASELINES.items() if path.startswith("hybridnav."))
     with tempfile.TemporaryDirectory() as folder:

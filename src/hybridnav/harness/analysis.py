@@ -16,7 +16,7 @@ from hybridnav._base.extension import in_html
 from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.columns import EFFICIENCY_COLUMNS, figures
-from hybridnav.harness.methods import BASELINES, REFERENCE
+from hybridnav.harness.names import BASELINES, REFERENCE
 from hybridnav.harness.outcome import MapQuery, Outcome, not_everywhere, pairs_in_common
 from hybridnav.harness.records import (
     Record,

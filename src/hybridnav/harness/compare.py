@@ -8,7 +8,7 @@ from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.analysis import Study, load_study
 from hybridnav.harness.judges import paired_difference
-from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.names import REFERENCE
 from hybridnav.harness.outcome import Outcome, loss_of, nanmean
 from hybridnav.harness.records import query_key
 from hybridnav.harness.tables import Row

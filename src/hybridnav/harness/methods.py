@@ -1,12 +1,10 @@
 """All methods of the harness by name: presets of our planner, and baselines."""
 
-import hashlib
 import inspect
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,106 +13,24 @@ from hybridnav._base.extension import extension
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.adapters import FoundMethod, HybridMethod, close_method
 from hybridnav.harness.baselines import MethodResult, Solver
-from hybridnav.harness.names import NamedMethod, baseline_name, class_of, own_name, source_hash
+from hybridnav.harness.names import (
+    BASELINES,
+    LINE_OF_SIGHT,
+    ON_PLACES,
+    RECORDED,
+    MethodSpec,
+    NamedMethod,
+    baseline_name,
+    class_of,
+    own_name,
+    source_hash,
+)
 from hybridnav.harness.recorded_method import content_of
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.costs import CostLayer
-from hybridnav.planning import Metric, Preset, load_preset
+from hybridnav.planning import Preset, load_preset
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.topology import TopologicalMap
-
-REFERENCE = "grid-astar"
-"""The baseline whose lengths are the optimum; part of every run."""
-
-LINE_OF_SIGHT = "line-of-sight"
-"""Value of `planner.smooth`; added to the names of presets that have it, as in
-`octile+line-of-sight`."""
-
-BASELINES: dict[str, tuple[str, dict[str, Any]]] = {
-    "grid-astar": ("hybridnav.harness.baselines.grid:GridAstar", {}),
-    "grid-dijkstra": ("hybridnav.harness.baselines.grid:GridDijkstra", {}),
-    "weighted-astar": ("hybridnav.harness.baselines.grid:WeightedAstar", {}),
-    "hpa-star": ("benchmarks.baselines.hpa:HpaStar", {}),
-    "hpa-star-raw": ("benchmarks.baselines.hpa:HpaStar", {"smooth": False}),
-    "hpa-star-lines": ("benchmarks.baselines.hpa:HpaStar", {"line_cells": 1000}),
-    "simple-graph": ("hybridnav.harness.baselines.regions:SimpleGraphPyramid", {}),
-    "thrun": ("benchmarks.baselines.thrun:ThrunMap", {}),
-}
-"""Class of each baseline and its options; those named in `ON_PLACES` are made from a
-`TopologicalMap`, the others from an `OccupancyGrid`. Those in `benchmarks` are in a checkout alone.
-Work outside this package names its own class as `module:class`."""
-
-RECORDED = "hybridnav.harness.recorded_method:RecordedMethod"
-"""The class of recorded paths."""
-
-ON_PLACES = frozenset({"simple-graph"})
-
-
-@dataclass(frozen=True)
-class MethodSpec:
-    """A method to build: a preset or a baseline, and the pyramid under it. Plain values, so that it
-    can go to another process."""
-
-    name: str
-    preset: dict[str, Any] | None
-    """The preset's sections; None for a baseline."""
-    pyramid: dict[str, Any] = field(default_factory=dict)
-    """merge_distance_m, linkage, seed: of the places that it plans on."""
-    graph: Any = None
-    """The `WaypointGraph` whose routes it follows, if that is all that it does; None for others."""
-    clear_edges_only: bool = False
-    """Whether edges of the graph that the robot cannot follow are left out."""
-    factory: str = ""
-    """The baseline, or the class as `module:class`, that makes it; empty for that of its name."""
-    settings: dict[str, Any] = field(default_factory=dict)
-    """Keyword arguments of its class."""
-    source: str = ""
-    """Hash of the file of a class of others: a class that was mended is another method."""
-    label: str = ""
-    """Name that a class of others gives itself, as far as known before it is made; else empty."""
-
-    @property
-    def made_by(self) -> str:
-        """The baseline, or the class as `module:class`."""
-        return self.factory or self.name
-
-    @property
-    def is_recorded(self) -> bool:
-        """Whether its paths were recorded: it has no times, and answers on its own map alone."""
-        return self.made_by == RECORDED
-
-    @property
-    def metric(self) -> Metric:
-        """Metric of its paths; octile for baselines, even for those whose answers have an
-        `any_angle` path."""
-        if self.graph is not None or self.is_recorded:
-            return "any-angle"
-        planner = (self.preset or {}).get("planner", {})
-        settings = (
-            ("method", "ompl"),
-            ("smooth", LINE_OF_SIGHT),
-            ("smooth", "arcs"),
-            ("method", "shortest"),
-        )
-        is_any_angle = any(planner.get(key) == value for key, value in settings)
-        return "any-angle" if is_any_angle else "octile"
-
-    @cached_property
-    def digest(self) -> str:
-        """Short hash of all settings, part of every record's id."""
-        parts: list[Any] = [self.name, self.preset, self.pyramid]
-        if self.graph is not None:
-            parts += [self.graph.digest, self.clear_edges_only]
-        if self.factory or self.settings or self.source:
-            parts += [self.factory, self.settings, self.source]
-        text = json.dumps(parts, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:12]
-
-    @property
-    def who(self) -> str:
-        """What has its name: the hash of a class of others with its settings, mended or not; the
-        name itself of other methods."""
-        return replace(self, source="").digest if self.source else self.name
 
 
 def preset_spec(

@@ -13,7 +13,7 @@ from hybridnav._base.typing import FloatArray, PathLike
 from hybridnav.harness import columns, tables
 from hybridnav.harness.analysis import Study, load_study, rows_of_map, rows_of_study
 from hybridnav.harness.judges import distance_buckets
-from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.names import REFERENCE
 from hybridnav.harness.outcome import REGIONS, Outcome, nanmean, nanquantile, pairs_in_common
 from hybridnav.harness.records import Record
 from hybridnav.harness.report import (

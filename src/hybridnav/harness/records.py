@@ -18,7 +18,7 @@ import hybridnav
 from hybridnav._base.moves import STEPS
 from hybridnav._base.typing import LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import BASELINES, REFERENCE
+from hybridnav.harness.names import BASELINES, REFERENCE
 from hybridnav.harness.yardstick import Fault, contradiction
 from hybridnav.maps.cells import MAX_CELLS
 
@@ -30,7 +30,7 @@ except ImportError:  # not a POSIX system: no lock there
 from collections.abc import Iterable
 from types import TracebackType
 
-from hybridnav.harness.methods import MethodSpec
+from hybridnav.harness.names import MethodSpec
 from hybridnav.harness.scenes import Pair
 from hybridnav.harness.yardstick import Kind
 

@@ -23,7 +23,7 @@ from hybridnav._base.typing import FloatArray
 from hybridnav.errors import MapError
 from hybridnav.harness.analysis import Study
 from hybridnav.harness.judges import chords_of
-from hybridnav.harness.methods import REFERENCE
+from hybridnav.harness.names import REFERENCE
 from hybridnav.harness.outcome import Outcome
 from hybridnav.harness.records import Record, decode_path, query_key
 from hybridnav.harness.scenes import MapSpec, map_digest, read_map

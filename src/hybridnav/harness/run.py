@@ -17,15 +17,13 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.typing import BoolArray, PathLike
 from hybridnav.errors import InvalidValueError, MapWarning, brief
 from hybridnav.harness.methods import (
-    REFERENCE,
-    MethodSpec,
     baseline_spec,
     graph_spec,
     named_spec,
     preset_spec,
     recorded_settings,
 )
-from hybridnav.harness.names import NamedMethod
+from hybridnav.harness.names import REFERENCE, MethodSpec, NamedMethod
 from hybridnav.harness.recorded_method import RecordedMethod
 from hybridnav.harness.records import RECORDS_FILE, RUNS_FILE, Record, RecordFile, read_records
 from hybridnav.harness.scenes import (

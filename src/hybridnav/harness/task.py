@@ -13,8 +13,8 @@ from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapErr
 from hybridnav.harness.adapters import checked
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.judging import Judge, status_of
-from hybridnav.harness.methods import REFERENCE, MethodSpec, Prepared, prepare
-from hybridnav.harness.names import own_settings
+from hybridnav.harness.methods import Prepared, prepare
+from hybridnav.harness.names import REFERENCE, MethodSpec, own_settings
 from hybridnav.harness.records import (
     Record,
     encode_path,

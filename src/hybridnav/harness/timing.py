@@ -21,7 +21,8 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.methods import MethodSpec, Prepared, prepare
+from hybridnav.harness.methods import Prepared, prepare
+from hybridnav.harness.names import MethodSpec
 from hybridnav.harness.outcome import Outcome
 from hybridnav.harness.records import Record, query_key
 from hybridnav.harness.scenes import MapSpec, Pair, read_scene
