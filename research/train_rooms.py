@@ -8,7 +8,7 @@ it is made from generated floors alone.
 import copy
 import math
 from argparse import Namespace
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from benchmarks.common import DATA, Refused, option
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.rooms import merging
 from hybridnav.rooms.cutting import Ground, fine_segments
-from hybridnav.rooms.find import LEAST_LIKELY, SPECK_M2, contract, outside_of
+from hybridnav.rooms.find import KINDS, LEAST_LIKELY, SPECK_M2, outside_of
 from hybridnav.rooms.merging import (
     EVIDENCE,
     Forest,
@@ -28,6 +28,7 @@ from hybridnav.rooms.merging import (
     Likely,
     Small,
     least_cells,
+    merge,
 )
 from research._rooms_boost import Boosting, Examples, averaged, boost
 from research._rooms_buildings import SITES, Building
@@ -81,8 +82,9 @@ def view_of(building: Building, degrees: float, scale: float) -> View:
         plain = ndimage.rotate(plain, degrees, order=0, cval=0.5, prefilter=False)
         true = ndimage.rotate(true, degrees, order=0, cval=-1, prefilter=False)
         grid = hn.OccupancyGrid(plain, hn.Frame(grid.resolution_m), robot_radius_m=0)
-    seen = Ground.of(grid, outside_of(grid))
-    ground = Ground(seen.free, seen.wall, seen.clearance, seen.resolution_m * scale)
+    free = (grid.measured == hn.CellClass.FREE) & ~outside_of(grid)
+    ground = Ground.of(KINDS[grid.measured] + free, grid.resolution_m)
+    ground = replace(ground, resolution_m=ground.resolution_m * scale)
     label_of = fine_segments(ground)
     segments = JudgedSegments(label_of, ground)
     dense = segments.label_of
@@ -112,7 +114,7 @@ def met(view: View, forest: Forest | None) -> Records:
         return np.where(known, same * (0.6 + 0.4 * opened), 0.0)
 
     specks = Small(least_cells(SPECK_M2, view.resolution_m**2))
-    contract(segments, [specks, Likely(judge, LEAST_LIKELY)])
+    merge(segments, [specks, Likely(judge, LEAST_LIKELY)])
     return records
 
 

@@ -9,16 +9,16 @@ from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.maps import CellClass, RoomLabels
-from hybridnav.rooms.cutting import Ground, closed_by_disc, fine_segments, wall_directions
-from hybridnav.rooms.find import contract
+from hybridnav.rooms.cutting import Ground, Kind, closed_by_disc, fine_segments, wall_directions
 from hybridnav.rooms.merging import (
     EVIDENCE,
     Forest,
-    Growth,
     JudgedSegments,
     Likely,
     Small,
+    merge,
 )
+from tests.rooms.growth import Growth, contract
 from tests.rooms.test_find_rooms import floor
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
 
@@ -75,10 +75,21 @@ def test_places_are_the_segments_and_fields_of_the_apex_what_is_left_of_them(sce
 
 
 @given(scene=cut())
+def test_a_pyramid_whose_arcs_resist_ends_with_the_same_segments(scene):
+    free, label_of = scene
+    found = []
+    for merged in (merge, contract):
+        segments = segments_of(free, label_of)
+        merged(segments, [Likely(by_sizes(segments), 0.4), Small(6)])
+        found.append(len(np.unique(segments.label_of[free])))
+    assert found[0] == found[1]
+
+
+@given(scene=cut())
 def test_segments_that_are_left_apart_resist(scene):
     free, label_of = scene
     segments = segments_of(free, label_of)
-    contract(segments, [Likely(by_sizes(segments), 0.4)])
+    merge(segments, [Likely(by_sizes(segments), 0.4)])
     sizes = dict(zip(*np.unique(segments.label_of, return_counts=True), strict=True))
     for pair in neighbours(segments.label_of):
         assert 1 / (1 + sum(sizes[label] for label in pair) / 20) < 0.4
@@ -88,7 +99,7 @@ def test_segments_that_are_left_apart_resist(scene):
 def test_no_small_segment_is_left_beside_another(scene):
     free, label_of = scene
     segments = segments_of(free, label_of)
-    contract(segments, [Small(12)])
+    merge(segments, [Small(12)])
     labels = segments.label_of
     beside = {label for pair in neighbours(labels) for label in pair}
     assert all((labels == label).sum() >= 12 for label in beside)
@@ -113,7 +124,7 @@ def test_the_likeliest_of_several_merges_first_and_the_others_are_judged_again()
         asked.append(ends)
         return np.array([likely.get(pair, 0.0) for pair in ends])
 
-    contract(segments, [Likely(judge, 0.5)])
+    merge(segments, [Likely(judge, 0.5)])
     assert set(asked[0]) == set(likely)
     (kept,) = set(segments.owner_of[[1, 2]].tolist())
     assert set(asked[1]) == {frozenset((0, kept)), frozenset((kept, 3))}
@@ -167,12 +178,12 @@ def test_many_segments_merge_in_few_levels(n_segments):
     assert len(pyramid) < 100
 
 
-NO_OUTSIDE = np.zeros((1, 1), dtype=bool)
+def ground_of(free, resolution_m=0.1):
+    return Ground.of(np.where(free, np.uint8(Kind.INSIDE), np.uint8(Kind.WALL)), resolution_m)
 
 
-def segments_of(free, label_of, resolution_m=0.1):
-    grid = occupancy_grid(free.astype(np.uint8), resolution_m=resolution_m)
-    return JudgedSegments(label_of.astype(np.int32), Ground.of(grid, NO_OUTSIDE))
+def segments_of(free, label_of):
+    return JudgedSegments(label_of.astype(np.int32), ground_of(free))
 
 
 def evidence_of(free, label_of):
@@ -216,7 +227,7 @@ def test_the_shipped_judge_keeps_a_door_and_joins_a_corridor():
     forest = Forest.shipped()
     for (free, label_of), n_rooms in ((two_rooms(), 2), (corridor(), 1)):
         segments = segments_of(free, label_of)
-        contract(segments, [Likely(forest.judge, 0.5)])
+        merge(segments, [Likely(forest.judge, 0.5)])
         assert len(np.unique(segments.label_of[free])) == n_rooms
 
 
@@ -247,7 +258,7 @@ def test_merged_segments_have_the_evidence_of_segments_that_were_never_apart(cla
     if not free.any():
         return
     segments = segments_of(free, label_of)
-    contract(segments, [Likely(lambda pairs, _: rng.random(len(pairs)), 0.7)])
+    merge(segments, [Likely(lambda pairs, _: rng.random(len(pairs)), 0.7)])
     again = segments_of(free, segments.label_of)
     state, fresh = segments.state, again.state
     kept = np.flatnonzero(state.versions >= 0)
@@ -269,7 +280,7 @@ def test_small_segments_go_to_the_neighbour_with_the_longest_open_border():
     label_of[2:22, 80:83] = 2
     label_of[2:8, 80] = 0  # a step makes its border there longer
     segments = segments_of(free, label_of)
-    contract(segments, [Small(100)])
+    merge(segments, [Small(100)])
     merged = segments.label_of
     assert merged[12, 81] == merged[12, 40] != merged[12, 120]
 
@@ -278,9 +289,7 @@ def test_walls_are_found_in_every_direction_of_a_turned_wing():
     straight, _ = floor()
     turned, _ = floor(0.3)
     sides = [grid.measured == hn.CellClass.OCCUPIED for grid in (straight, turned)]
-    rims = []
-    for grid, occupied in zip((straight, turned), sides, strict=True):
-        rims.append(Ground.of(grid, np.zeros(occupied.shape, dtype=bool)).wall)
+    rims = [ground_of(~occupied).wall for occupied in sides]
     wide = np.zeros((700, 200), dtype=bool)
     wide[: rims[0].shape[0], : rims[0].shape[1]] = rims[0]
     wide[-rims[1].shape[0] :, : rims[1].shape[1]] = rims[1]
@@ -292,8 +301,7 @@ def test_a_bay_of_8_m_is_cut_from_its_corridor():
     free = np.zeros((104, 304), dtype=bool)
     free[2:22, 2:302] = True
     free[22:102, 102:182] = True
-    grid = occupancy_grid(free.astype(np.uint8), resolution_m=0.1)
-    found = fine_segments(Ground.of(grid, NO_OUTSIDE))
+    found = fine_segments(ground_of(free))
     bay, hall = np.unique(found[30:100, 105:180]), np.unique(found[3:20, 5:300])
     assert not set(bay.tolist()) & set(hall.tolist())
 

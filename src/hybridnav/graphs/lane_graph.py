@@ -18,7 +18,7 @@ from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.cover import Aims, complete
 from hybridnav.graphs.drawing import ChainGraph, add_chords, drop_ends
 from hybridnav.graphs.files.nav2_rules import MOST_ID
-from hybridnav.graphs.free_space import LEAST_AREA_M2, FreeSpace, Orientation, checked_position
+from hybridnav.graphs.free_space import LEAST_AREA_M2, FreeSpace, checked_position
 from hybridnav.graphs.joining import Nodes, missing_bends
 from hybridnav.graphs.lanes import described
 from hybridnav.graphs.route_messages import ids_of
@@ -29,6 +29,7 @@ from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.clearance import clearance_cells
 from hybridnav.maps.frame import FARTHEST_M
+from hybridnav.maps.orientation import Orientation
 from hybridnav.rooms import Rooms
 from hybridnav.rooms.cutting import wall_directions
 from hybridnav.topology import TopologicalMap

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.trig import cos, tan
-from hybridnav._base.typing import BoolArray, FloatArray, IntArray
-from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray
 from hybridnav.maps.clearance import clearance_cells, closing
 from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
 
@@ -46,6 +46,17 @@ _FAINT = 0.05
 of the map at least that of the strongest."""
 
 
+class Kind(IntEnum):
+    """Kind of a cell for the cut into segments."""
+
+    UNKNOWN = 0
+    OUTSIDE = 1
+    """Free, but outside of the building."""
+    INSIDE = 2
+    """Free, inside of it."""
+    WALL = 3
+
+
 @dataclass(frozen=True, eq=False)
 class Ground:
     """What counts as free and as wall when a map is cut into segments."""
@@ -60,35 +71,32 @@ class Ground:
     """Side of a cell in metres."""
 
     @classmethod
-    def of(cls, grid: OccupancyGrid, outside: BoolArray) -> Ground:
-        """Return the ground of a map as measured.
+    def of(cls, kinds: ByteArray, resolution_m: float) -> Ground:
+        """Return the ground of some cells.
 
         On a scan of single rays, the unexplored cells between them count as free, and what is
         unexplored beyond as wall.
 
-        `grid`: the map; the robot's radius changes nothing; `outside`: bool (rows, cols), free
-        cells outside of the building, which count as none.
+        `kinds`: uint8 (rows, cols), see `Kind`; `resolution_m`: side of a cell in metres.
         """
-        measured = grid.measured == CellClass.FREE
-        occupied = grid.measured == CellClass.OCCUPIED
-        free = measured & ~outside
-        closed = closed_by_disc(free, occupied, _CLOSE_M / grid.resolution_m)
+        occupied, free = kinds == Kind.WALL, kinds == Kind.INSIDE
+        closed = closed_by_disc(free, occupied, _CLOSE_M / resolution_m)
         rim = _rim(closed)
-        n_unexplored = np.count_nonzero(rim & ~occupied & ~measured)
+        n_unexplored = np.count_nonzero(rim & (kinds == Kind.UNKNOWN))
         unexplored = float(n_unexplored / max(1, int(np.count_nonzero(rim))))
         if unexplored > _NO_WALLS:
-            occupied = occupied | (_rim(free) & ~measured)
+            occupied = occupied | (_rim(free) & (kinds != Kind.OUTSIDE))
         elif unexplored > _RAYS:
-            free = closed_by_disc(free, occupied, _CLOSE_RAYS_M / grid.resolution_m)
+            free = closed_by_disc(free, occupied, _CLOSE_RAYS_M / resolution_m)
             holes, _ = ndimage.label(~free & ~occupied)
-            small = np.bincount(holes.ravel()) * grid.cell_area_m2 < _HOLE_M2
+            small = np.bincount(holes.ravel()) * (resolution_m * resolution_m) < _HOLE_M2
             small[0] = False
             free = free | small[holes]
             occupied = occupied | _rim(free)
-        near = ndimage.distance_transform_edt(~free) * grid.resolution_m <= _RIM_M
+        near = ndimage.distance_transform_edt(~free) * resolution_m <= _RIM_M
         clearance = clearance_cells(occupied)
         clearance[~np.isfinite(clearance)] = 1.0
-        return cls(free, occupied & near, clearance, grid.resolution_m)
+        return cls(free, occupied & near, clearance, resolution_m)
 
 
 def fine_segments(ground: Ground) -> IntArray:

@@ -4,28 +4,29 @@ map, or anew in a part of it beside rooms that stay.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, CellClass, Frame, OccupancyGrid, RoomLabels
+from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
+from hybridnav.maps.areas import box_of_mask
+from hybridnav.maps.orientation import Orientation
 from hybridnav.maps.room_labels import MAX_ROOMS
-from hybridnav.pyramid import DualGraphPyramid
-from hybridnav.rooms.cutting import Ground, fine_segments
+from hybridnav.rooms.cutting import Ground, Kind, fine_segments
 from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
 from hybridnav.rooms.merging import (
     Forest,
-    Growth,
+    Judge,
     JudgedSegments,
     Likely,
     Rule,
     Small,
     grown,
     least_cells,
+    merge,
 )
 
 Cell = tuple[int, int]
@@ -39,6 +40,8 @@ _LARGEST_LEAST_M2 = 1e9
 """Least areas beyond it are taken for a mistake."""
 SPECK_M2 = 0.25
 """Segments below it go to a neighbour before boundaries are judged."""
+KINDS = np.array([Kind.WALL, Kind.OUTSIDE, Kind.UNKNOWN], np.uint8)
+"""Kind of each class of cells, free ones as if outside: plus 1 inside."""
 LEAST_LIKELY = 0.5
 """Segments of one room: the least probability at which they merge."""
 WALL_REACH_M = 0.25
@@ -89,21 +92,6 @@ def find_rooms(grid: OccupancyGrid, *, least_area_m2: float = 1.0) -> RoomLabels
     return RoomLabels(names, reaching(labels, grid))
 
 
-def contract(segments: JudgedSegments, rules: Sequence[Rule]) -> DualGraphPyramid:
-    """Contract segments until every boundary between them resists.
-
-    `segments`, `rules`: as of `Growth`; the segments merge as the fields do. Result: its places are
-    the segments as they were, the fields of its apex those that are left.
-    """
-    free = segments.label_of >= 0
-    grid = OccupancyGrid(
-        np.where(free, 0.0, 1.0).astype(np.float32), Frame(1.0), robot_radius_m=0.0
-    )
-    return DualGraphPyramid.build(
-        grid, merge_distance_m=math.inf, resistance=Growth(segments, rules)
-    )
-
-
 def check_least_area(least_area_m2: float) -> None:
     """Raise `InvalidValueError` if the least area of a room is out of range, or no number."""
     is_number = isinstance(least_area_m2, int | float | np.number)
@@ -132,17 +120,36 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
 def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> IntArray:
     """Cut free space finely, and merge the segments by a judge of their boundaries.
 
+    All is done on the known cells alone, in the one of their eight images that `Orientation`
+    chooses: equal places have equal rooms, whatever lies round the map and however it is turned.
+
     `grid`: the map; cells count as they were measured; `least_area_m2`: see `find_rooms`. Returns
     int32 (rows, cols), rooms in reading order, -1 elsewhere.
     """
-    outside = outside_of(grid)
-    ground = Ground.of(grid, outside)
+    free = (grid.measured == CellClass.FREE) & ~outside_of(grid)
+    if not free.any():
+        return np.full(grid.shape, NO_ROOM, dtype=np.int32)
+    margin = int(WALL_REACH_M / grid.resolution_m) + 1
+    kinds = np.pad(KINDS[grid.measured] + free, margin)
+    found = np.full(kinds.shape, NO_ROOM, dtype=np.int32)
+    top, bottom, left, right = box_of_mask(kinds != Kind.UNKNOWN)
+    known = np.s_[top - margin : bottom + margin, left - margin : right + margin]
+    image = Orientation.of(kinds[known])
+    kinds = np.ascontiguousarray(image.turned(kinds[known]).T)  # the longer extent along columns
+    ground = Ground.of(kinds, grid.resolution_m)
     segments = JudgedSegments(fine_segments(ground), ground)
-    specks = least_cells(min(SPECK_M2, least_area_m2), grid.cell_area_m2)
     least = least_cells(least_area_m2, grid.cell_area_m2)
-    contract(segments, [Small(specks), Likely(forest.judge, LEAST_LIKELY), Small(least)])
-    free = (grid.measured == CellClass.FREE) & ~outside
-    return _in_reading_order(np.where(free, segments.label_of, np.int32(NO_ROOM)), least)
+    merge(segments, _rules(forest.judge, least_area_m2, grid.cell_area_m2))
+    found[known] = image.turned_back(segments.label_of.T)
+    labels = np.where(free, found[margin:-margin, margin:-margin], np.int32(NO_ROOM))
+    return _in_reading_order(labels, least)
+
+
+def _rules(judge: Judge, least_area_m2: float, cell_m2: float) -> list[Rule]:
+    """Return the rules by which segments become rooms."""
+    specks = least_cells(min(SPECK_M2, least_area_m2), cell_m2)
+    least = least_cells(least_area_m2, cell_m2)
+    return [Small(specks), Likely(judge, LEAST_LIKELY), Small(least)]
 
 
 def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
@@ -165,14 +172,18 @@ def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
 def outside_of(grid: OccupancyGrid) -> BoolArray:
     """Return the free cells outside the building, which belong to no room.
 
-    They are connected along sides, reach all four sides of the map, and fill at least half of its
-    border. They surround free space that they cannot reach, at least a tenth of their own area. So
-    the margin of a building's image is outside, and so is the ground round a race track, but not a
-    hall that the map's border cuts off.
+    They are connected along sides, reach all four sides of the known cells, and fill at least half
+    of that border. They surround free space that they cannot reach, at least a tenth of their own
+    area. So the margin of a building's image is outside, and so is the ground round a race track,
+    but not a hall that the map's border cuts off.
     """
-    free = grid.measured == CellClass.FREE
-    if 2 * sum(np.count_nonzero(free[side]) for side in _SIDES) < sum(2 * n for n in free.shape):
-        return np.zeros_like(free)  # most maps: their border is unexplored
+    top, bottom, left, right = box_of_mask(grid.measured != CellClass.UNEXPLORED)
+    known = np.s_[top:bottom, left:right]
+    found = np.zeros(grid.shape, dtype=np.bool_)
+    free = grid.measured[known] == CellClass.FREE
+    n_rim = sum(np.count_nonzero(free[side]) for side in _SIDES) if free.any() else 0
+    if n_rim < max(1, sum(free.shape)):
+        return found  # most maps: their border is unexplored
     part_of, n_parts = ndimage.label(free)
     borders = [part_of[side] for side in _SIDES]
     on_border = [np.bincount(border, minlength=n_parts + 1) for border in borders]
@@ -182,7 +193,8 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
     inside = areas[1:][~np.any(np.stack(on_border) > 0, axis=0)[1:]].sum()
     around &= inside >= _LEAST_INSIDE * areas
-    return around[part_of]
+    found[known] = around[part_of]
+    return found
 
 
 def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
@@ -278,7 +290,8 @@ def renewed_rooms(
     -1 for segments that are too small. -1 elsewhere.
     """
     to_find = room_of == NO_ROOM
-    ground = Ground.of(grid, outside)
+    free = (grid.measured == CellClass.FREE) & ~outside
+    ground = Ground.of(KINDS[grid.measured] + free, grid.resolution_m)
     first = int(room_of.max(initial=NO_ROOM)) + 1
     label_of = np.where(room_of >= 0, room_of, np.int32(NO_ROOM))
     fine = fine_segments(ground)
@@ -289,15 +302,13 @@ def renewed_rooms(
     segments = JudgedSegments(label_of, ground)
     # The numbers of rooms that stay lie below all others, and segments keep the order.
     stays = np.arange(len(np.unique(room_of[room_of >= 0])))
-    specks = least_cells(min(SPECK_M2, least_area_m2), grid.cell_area_m2)
-    least = least_cells(least_area_m2, grid.cell_area_m2)
-    rules = Small(specks), Likely(_Lasting(segments, before).judge, LEAST_LIKELY), Small(least)
-    contract(segments, [_Apart(rule, stays) for rule in rules])
+    rules = _rules(_Lasting(segments, before).judge, least_area_m2, grid.cell_area_m2)
+    merge(segments, [_Apart(rule, stays) for rule in rules])
     known = np.full(segments.n_segments, NO_ROOM, np.int32)
     known[segments.owner_of[stays]] = np.unique(room_of[room_of >= 0])
     merged = segments.label_of
     areas = np.bincount(merged[to_find & (merged >= 0)], minlength=segments.n_segments)
-    new = (known == NO_ROOM) & (areas >= least)
+    new = (known == NO_ROOM) & (areas >= least_cells(least_area_m2, grid.cell_area_m2))
     known[new] = first + np.arange(np.count_nonzero(new), dtype=np.int32)
     found: IntArray = np.append(known, np.int32(NO_ROOM))[merged]
     return np.where(to_find, found, np.int32(NO_ROOM))

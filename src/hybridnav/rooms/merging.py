@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from itertools import chain, count
-from typing import TYPE_CHECKING, Protocol
+from itertools import chain
+from typing import Protocol
 
 import numpy as np
 from scipy import ndimage
 
-from hybridnav.pyramid.darts import WORST_RANK, Darts
+from hybridnav._base.typing import FloatArray, IntArray, LongArray
+from hybridnav.rooms.cutting import Ground
 from hybridnav.rooms.kernels import merging as _merging_kernels
 from hybridnav.rooms.kernels import segmentation as _evidence_kernels
 from hybridnav.rooms.kernels.merging import SegmentState
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from hybridnav._base.typing import FloatArray, IntArray, LongArray
-    from hybridnav.rooms.cutting import Ground
-
-    Judge = Callable[[LongArray, FloatArray], FloatArray]
+Judge = Callable[[LongArray, FloatArray], FloatArray]
+"""Returns the probability that both segments of each pair belong to one room, float64 (n,), by
+their evidence, float64 (n, len(EVIDENCE))."""
 
 _ROUNDING = 1e-9
 
@@ -132,21 +130,18 @@ class JudgedSegments:
         )
         return found
 
-    def pair_of(self, segment: int, other: int) -> int:
-        """Return the pair of two segments, -1 if they do not touch."""
-        pairs = _merging_kernels.pairs_of(self.state, segment)
-        found = pairs[(self.state.endpoints[pairs] == other).any(axis=1)]
-        return int(found[0]) if len(found) else -1
-
-    def merge(self, pair: int) -> int:
-        """Merge the two segments of a pair, and return the one that is left."""
-        sizes = self.state.hull_sizes[self.state.endpoints[pair]].sum()
+    def merge(self, pairs: LongArray) -> LongArray:
+        """Merge the two segments of each pair, no segment of two pairs; return those left."""
+        sizes = self.state.hull_sizes[self.state.endpoints[pairs]].sum()
         if self.state.hulls_used[0] + sizes > len(self.state.hulls):
-            hulls = np.concatenate([self.state.hulls, np.empty_like(self.state.hulls)])
+            hulls = np.empty((sizes + len(self.state.hulls), 2))
+            hulls = np.concatenate([self.state.hulls, hulls])
             self.state = self.state._replace(hulls=hulls)
-        kept, gone = _merging_kernels.merge_pair(self.state, pair)
-        self.owner_of[self.owner_of == gone] = kept
-        return int(kept)
+        kept, gone = _merging_kernels.merge_pairs(self.state, pairs).T
+        into = np.arange(self.n_segments)
+        into[gone] = kept
+        self.owner_of = into[self.owner_of]
+        return kept
 
 
 def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
@@ -216,13 +211,6 @@ def _halves(endpoints: LongArray, n: int) -> tuple[LongArray, LongArray]:
     return first, following
 
 
-# Rooms that grow out of segments: levels of a pyramid in which boundaries resist.
-
-
-_PATIENCE = 48
-"""Levels at which an arc waits for better ones at its endpoints; a pyramid has 126 at most."""
-
-
 class Rule(Protocol):
     """What decides which pairs of segments may merge."""
 
@@ -249,15 +237,16 @@ class Likely:
         """Return the probability of each pair, 0 below the least; see `Rule`."""
         state = segments.state
         if len(self._likely):
-            beside = [_merging_kernels.pairs_of(state, int(segment)) for segment in grown]
-            pairs = np.unique(np.concatenate([np.empty(0, np.int64), *beside]))
+            has_grown = np.zeros(segments.n_segments, dtype=np.bool_)
+            has_grown[grown] = True
+            judged = has_grown[state.endpoints].any(axis=1)
         else:
-            self._likely = np.zeros(len(state.endpoints))
-            pairs = np.flatnonzero(state.endpoints[:, 0] >= 0)
-        pairs = pairs[state.open_sides[pairs] > 0]
+            self._likely, judged = np.zeros(len(state.endpoints)), True
+        pairs = np.flatnonzero((state.endpoints[:, 0] >= 0) & (state.open_sides > 0) & judged)
         if len(pairs):
             self._likely[pairs] = self._judge(pairs, segments.evidence(pairs))
-        return np.where(self._likely >= self._least, self._likely, 0.0)
+        may = (state.endpoints[:, 0] >= 0) & (self._likely >= self._least)
+        return np.where(may, self._likely, 0.0)
 
 
 class Small:
@@ -284,130 +273,23 @@ class Small:
         return ratings
 
 
-class Growth:
-    """The resistance of boundaries between segments by rules, one after the other; see `Resists`.
+def merge(segments: JudgedSegments, rules: Sequence[Rule]) -> None:
+    """Merge segments by rules, one after the other, until no pair may merge by any of them.
 
-    `segments`: the segments; they merge as the fields do; `rules`: when no arc may be contracted by
-    one of them, the next one decides.
+    Of all pairs that may, those merge that no better one meets at either segment; then those that
+    touch what has grown are rated again.
     """
-
-    def __init__(self, segments: JudgedSegments, rules: Sequence[Rule]) -> None:
-        self._segments, self._rules = segments, rules
-        self._label_of = segments.label_of
-        self.kept_apart: IntArray = _colours(segments)[self._label_of]
-        self.shape = self._label_of.shape
-
-    def steering(self, field_of: IntArray, n_vertices: int) -> GrowingSegments:
-        """Return the steering from a level on whose fields are the segments."""
-        inside = field_of >= 0
-        segment_of = np.full(n_vertices, -1, dtype=np.int64)
-        segment_of[field_of[inside]] = self._label_of.ravel()[inside]
-        return GrowingSegments(self._segments, self._rules, segment_of)
+    for rule in rules:
+        changed = np.empty(0, dtype=np.int64)
+        while len(pairs := _best(segments.state.endpoints, rule.ratings(segments, changed))):
+            changed = segments.merge(pairs)
 
 
-class GrowingSegments:
-    """A steering by the boundaries of segments; see `Steering`.
-
-    An arc waits while a better one meets one of its endpoints, so that segments merge nearly in the
-    order of one contraction at a time, and boundaries of a merged segment are rated anew before the
-    next level.
-
-    `segments`, `rules`: see `Growth`; `segment_of`: int64 (n_vertices,), the segment of each vertex
-    of the level to start from, -1 for none.
-    """
-
-    def __init__(
-        self, segments: JudgedSegments, rules: Sequence[Rule], segment_of: LongArray
-    ) -> None:
-        self._segments, self._segment_of = segments, segment_of
-        self._rules = list(rules)
-        self._grown = np.empty(0, dtype=np.int64)
-        self._levels = 0
-        self._of_arc = np.empty(0)
-
-    def candidates(
-        self, field_of: Callable[[], IntArray], darts: Darts, vertices: object
-    ) -> tuple[LongArray, LongArray]:
-        """Return the arcs that may be contracted, and that no better one keeps waiting."""
-        u, v = self._segment_of[darts.origin.reshape(-1, 2).T]
-        loops = darts.origin[::2] == darts.origin[1::2]
-        ratings = self._rated(u, v)
-        ratings[(u == v) & (u >= 0) & ~loops] = 1.0  # parts of one segment that have met
-        may = ratings > 0
-        if not may.any() and len(self._rules) > 1:
-            self._rules.pop(0)
-            return self.candidates(field_of, darts, vertices)
-        self._of_arc = ratings
-        self._levels += 1
-        if self._waits:
-            best = np.zeros(self._segments.n_segments)
-            np.maximum.at(best, u[may], ratings[may])
-            np.maximum.at(best, v[may], ratings[may])
-            may[may] = ratings[may] >= np.maximum(best[u[may]], best[v[may]])
-        arcs = np.flatnonzero(may)
-        return arcs, (WORST_RANK * (1.0 - ratings[arcs])).astype(np.int64)
-
-    def refuse_leaves(self, parent: IntArray, kernel_dart: IntArray) -> None:
-        """Undo all joins of a star but the best: the others are rated again without it."""
-        if not self._waits:
-            return
-        leaves = np.flatnonzero(kernel_dart >= 0)
-        leaves = leaves[np.argsort(-self._of_arc[kernel_dart[leaves] >> 1], kind="stable")]
-        _, first = np.unique(parent[leaves], return_index=True)
-        undone = np.delete(leaves, first)
-        parent[undone], kernel_dart[undone] = undone, -1
-
-    def merge(self, merged_into: IntArray, n_vertices: int) -> None:
-        """Merge the segments as their vertices do."""
-        before, segments = self._segment_of, self._segments
-        segment_of = np.full(n_vertices, -1, dtype=np.int64)
-        segment_of[merged_into] = before
-        stars = np.bincount(merged_into)[merged_into] > 1
-        joins = np.stack([segment_of[merged_into[stars]], before[stars]], axis=1)
-        grown: list[int] = []
-        while len(joins):
-            apart = []
-            for one, other in joins.tolist():
-                u, v = (int(segments.owner_of[segment]) for segment in (one, other))
-                if u == v:
-                    continue
-                pair = segments.pair_of(u, v)
-                if pair < 0:  # two leaves of a star: once its centre has joined, they touch
-                    apart.append((one, other))
-                else:
-                    grown.append(segments.merge(pair))
-            joins = np.array(apart)
-        self._grown = np.unique(segments.owner_of[grown])
-        self._segment_of = segments.owner_of[segment_of]
-
-    @property
-    def _waits(self) -> bool:
-        return self._levels <= _PATIENCE
-
-    def _rated(self, u: LongArray, v: LongArray) -> FloatArray:
-        """Return the rating of the arcs between segments, 0 for the others."""
-        of_pair = self._rules[0].ratings(self._segments, self._grown)
-        endpoints, n = self._segments.state.endpoints, self._segments.n_segments
-        alive = np.flatnonzero(endpoints[:, 0] >= 0)
-        low, high = np.sort(endpoints[alive], axis=1).T
-        keys = low * n + high
-        order = np.argsort(keys, kind="stable")
-        between = (u != v) & (u >= 0) & (v >= 0)
-        wanted = (np.minimum(u, v) * n + np.maximum(u, v))[between]
-        ratings = np.zeros(len(u))
-        ratings[between] = of_pair[alive[order[np.searchsorted(keys, wanted, sorter=order)]]]
-        return ratings
-
-
-def _colours(segments: JudgedSegments) -> IntArray:
-    """Return a number for each segment that none beside it has: a pyramid has few kinds of cells.
-
-    The last one, for no segment, is -1.
-    """
-    colour_of = np.full(segments.n_segments + 1, -1, dtype=np.int32)
-    for segment in np.flatnonzero(segments.state.versions >= 0).tolist():
-        pairs = _merging_kernels.pairs_of(segments.state, segment)
-        beside = segments.state.endpoints[pairs].sum(axis=1) - segment
-        taken = set(colour_of[beside].tolist())
-        colour_of[segment] = next(colour for colour in count() if colour not in taken)
-    return colour_of
+def _best(endpoints: LongArray, ratings: FloatArray) -> LongArray:
+    """Return pairs of segments, each the best at both ends, none with an end in common."""
+    pairs = np.flatnonzero(ratings > 0)
+    pairs = pairs[np.argsort(-ratings[pairs], kind="stable")]
+    place = np.arange(len(pairs))[:, None]
+    first = np.full(endpoints.max(initial=0) + 1, len(pairs))
+    np.minimum.at(first, endpoints[pairs], place)
+    return pairs[(first[endpoints[pairs]] == place).all(axis=1)]

@@ -22,7 +22,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.ext.live import OnlineRooms
 from hybridnav.maps import Frame, OccupancyGrid
 from hybridnav.rooms.cutting import Ground
-from hybridnav.rooms.find import outside_of, reaching
+from hybridnav.rooms.find import KINDS, outside_of, reaching
 from tests.ext.live.identities import parts_of, run_machine
 from tests.strategies import examples
 
@@ -68,7 +68,8 @@ def pockets_of(grid):
     free = (grid.measured == 1) & ~outside
     parts, _ = ndimage.label(free)
     pockets = free & (np.bincount(parts.ravel()) * grid.resolution_m**2 < 1.0)[parts]
-    joined, n_joined = ndimage.label(Ground.of(grid, outside).free)
+    ground = Ground.of(KINDS[grid.measured] + free, grid.resolution_m)
+    joined, n_joined = ndimage.label(ground.free)
     among_rays = np.isin(np.arange(n_joined + 1), joined[~free & (joined > 0)])
     return pockets, pockets & among_rays[joined]
 

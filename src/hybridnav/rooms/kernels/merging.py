@@ -265,7 +265,15 @@ def pairs_of(state, segment):
     return found
 
 
-@guarded
+@njit(cache=True, nogil=True)
+def merge_pairs(state, pairs):
+    """Merge the segments of each pair; return the one that is left and the one that is gone."""
+    found = np.empty((len(pairs), 2), np.int64)
+    for k in range(len(pairs)):
+        found[k] = merge_pair(state, pairs[k])
+    return found
+
+
 @njit(cache=True, nogil=True)
 def merge_pair(state, pair):
     """Let the larger segment of a pair take the other; return both."""

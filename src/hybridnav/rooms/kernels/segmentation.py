@@ -62,10 +62,16 @@ def grow_labels(label_of, region, most_steps):
     rows, cols = label_of.shape
     queue = np.empty(rows * cols, np.int64)
     head = tail = 0
-    for cell in range(rows * cols):
-        if label_of[cell // cols, cell % cols] >= 0:
-            queue[tail] = cell
-            tail += 1
+    for row in range(rows):
+        for col in range(cols):
+            if label_of[row, col] < 0:
+                continue
+            for step in ((0, 1), (1, 0), (0, -1), (-1, 0)):  # others spread to nothing
+                r, c = row + step[0], col + step[1]
+                if 0 <= r < rows and 0 <= c < cols and label_of[r, c] < 0:
+                    queue[tail] = row * cols + col
+                    tail += 1
+                    break
     for _ in range(most_steps):
         if head == tail:
             break
