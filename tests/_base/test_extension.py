@@ -1,6 +1,6 @@
 """Entry points: what other packages add is found by name; what is not there is said in a line."""
 
-from importlib.metadata import EntryPoint
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -22,9 +22,8 @@ def read_text(path: Any, **reading: Any) -> hn.OccupancyGrid:
 @pytest.fixture
 def text_maps(monkeypatch: pytest.MonkeyPatch) -> None:
     """A package that registers the suffix `.txt`, installed for one test."""
-    point = EntryPoint(".txt", f"{__name__}:read_text", "hybridnav.formats")
     known = extension.extensions
-    everything = {".txt": point} | known("formats")
+    everything = {".txt": f"{__name__}:read_text"} | known("formats")
 
     def extensions(group: str) -> Any:
         return everything if group == "formats" else known(group)
@@ -45,6 +44,28 @@ def test_the_wing_is_registered() -> None:
     assert set(extension.extensions("commands")) >= commands
     assert {".hnm", "building", "bag"} <= set(extension.extensions("formats"))
     assert "graph" in set(extension.extensions("methods"))
+
+
+def test_entry_points_are_those_that_importlib_finds(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    about = tmp_path / "planners_of_mine-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: planners-of-mine\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(
+        "[console_scripts]\nplan = mine:plan\n\n# Formats.\n[hybridnav.formats]\n# none = no:ne\n"
+        ".mine = mine.maps : read [extra]\nsvg=mine\n[hybridnav.methods]\nsvg = other\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    extension.extensions.cache_clear()
+    try:
+        for group in ("commands", "formats", "pictures", "methods", "none"):
+            points = entry_points(group=f"hybridnav.{group}")
+            right = {one.name: one.module + f":{one.attr}" * bool(one.attr) for one in points}
+            assert extension.extensions(group) == right
+        assert extension.extensions("formats")[".mine"] == "mine.maps:read"
+    finally:
+        extension.extensions.cache_clear()
 
 
 def test_what_nothing_registers_is_said_in_one_line() -> None:
