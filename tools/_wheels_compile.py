@@ -11,13 +11,13 @@ from pathlib import Path
 from pkgutil import walk_packages
 
 import hybridnav
-from hybridnav._base import jit
+from hybridnav._base import shipped
 
 
 def main(listed: Path, folder: Path) -> None:
     """Compile the kernels of a list into a folder, in the places where a wheel has them."""
-    jit.SHIPPED = folder
-    jit.LEVELS.clear()  # what another level has does not count
+    shipped.SHIPPED = folder
+    shipped.LEVELS.clear()  # what another level has does not count
     level = os.environ["NUMBA_CPU_NAME"]
     for each in walk_packages(hybridnav.__path__, "hybridnav."):
         if ".kernels." in each.name:  # some say what stands for a function of another module

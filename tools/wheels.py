@@ -1,7 +1,7 @@
 """Build wheels that bring compiled kernels, one for each Python, and try them: `make wheels`.
 
 For each Python `EXERCISE` runs with a wheel in an environment of its own. What it compiles is
-compiled for the levels of x86-64 in `hybridnav._base.jit.LEVELS` and packed, until it compiles
+compiled for the levels of x86-64 in `hybridnav._base.shipped.LEVELS` and packed, until it compiles
 nothing; the next Python begins with the kernels of the one before, the first one with those of a
 checkout of this commit whose tests have run, if `--known` names one. Then, in a home that cannot be
 written, the answers of `tests.answers` must be those of a run that compiles for this processor, bit
@@ -24,7 +24,7 @@ from typing import Any
 
 from benchmarks.common import ROOT, Refused, option
 from benchmarks.subjects.cold import PLAN
-from hybridnav._base.jit import LEVELS
+from hybridnav._base.shipped import LEVELS
 
 EXERCISE = (
     *("tests/product/test_readme.py", "tests/product/test_notebooks.py"),

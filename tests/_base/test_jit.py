@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from numba.core import event
 
-from hybridnav._base.jit import LEVELS, levels, njit
+from hybridnav._base.jit import njit
+from hybridnav._base.shipped import LEVELS, levels
 
 SOURCE = Path(__file__).parents[2] / "src"
 
@@ -147,18 +148,18 @@ _SHIPS = """
 import logging, os, sys
 from pathlib import Path
 import numpy as np
-from hybridnav._base import jit
+from hybridnav._base import shipped
 logging.basicConfig(level=logging.INFO, stream=sys.stdout, format="%(message).14s")
-jit.SHIPPED = Path(sys.argv[1])
+shipped.SHIPPED = Path(sys.argv[1])
 from hybridnav._base.kernels import arrays
 if sys.argv[2:]:
-    jit.LEVELS.clear()
+    shipped.LEVELS.clear()
     cache = arrays.push._cache
     cache._cache_file = cache._shipped(os.environ["NUMBA_CPU_NAME"])
     Path(cache._cache_file._cache_path).mkdir(parents=True)
 keys = np.full((4, 2), 7)
 arrays.push(keys, 0, 3, 5)
-print(keys[0].tolist(), jit.is_for_another_numba(), arrays.push.is_warm(), end=" ")
+print(keys[0].tolist(), shipped.is_for_another_numba(), arrays.push.is_warm(), end=" ")
 print("scipy.linalg" in sys.modules)
 """
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-import hybridnav._base.jit  # noqa: F401 - makes the functions known to numba
+import hybridnav._base.compiler  # noqa: F401 - makes the functions known to numba
 from hybridnav._base import trig as _trig
 from hybridnav._base.trig import (
     acos,

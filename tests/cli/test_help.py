@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import typer
 
+from hybridnav.cli import help as helping
 from hybridnav.cli.app import app
 from hybridnav.cli.plan import plan
 from hybridnav.cli.query import PlanOptions
@@ -67,6 +68,38 @@ def test_every_command_stands_in_a_group_with_its_whole_summary(cli):
     assert [*sections][2:] == ["Commands", *groups]
     listed = [line.split()[0] for group in groups for line in sections[group][1:] if line]
     assert sorted(listed) == sorted([*COMMANDS, "preset"])
+
+
+def test_the_summary_of_a_command_is_that_of_its_docstring_though_it_is_not_loaded() -> None:
+    assert sorted(helping.names()) == sorted([*COMMANDS, "preset"])
+    for name in helping.names():
+        home = app_command(name)
+        assert helping._summary_of(name) == home.get_short_help_str(200)
+
+
+def app_command(name: str) -> Any:
+    """A command as Typer makes it."""
+    group: Any = typer.main.get_command(app)
+    return group.get_command(None, name)
+
+
+def test_help_loads_neither_typer_nor_the_commands() -> None:
+    code = (
+        "import sys\nfrom hybridnav.cli import main\nsys.argv[1:] = ['--help']\n"
+        "try:\n    main()\nfinally:\n    loaded = {'typer', 'numpy', 'hybridnav.cli.app'}\n"
+        "    sys.stderr.write(str(loaded & set(sys.modules)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stderr == "set()"
+    assert (
+        done.stdout
+        == subprocess.run(
+            [sys.executable, "-c", "from hybridnav.cli.app import run; run(['--help'])"],
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout
+    )
 
 
 def test_options_of_plan_stand_in_panels_what_is_typed_first_on_top(cli):

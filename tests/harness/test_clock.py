@@ -148,4 +148,4 @@ def test_only_deadlines_are_told_by_another_clock():
         if "perf_counter" in path.read_text(encoding="utf-8")
     }
     mesh = {"search/mesh/search.py"}
-    assert read == {"_base/clock.py", "_base/jit.py", *mesh}
+    assert read == {"_base/clock.py", "_base/compiler.py", *mesh}

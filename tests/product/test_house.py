@@ -14,27 +14,27 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 64_540,
-    "lines": 102_280,
-    "files": 431,
-    "code outside ext": 49_608,
+    "code": 64_860,
+    "lines": 102_780,
+    "files": 434,
+    "code outside ext": 49_930,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
     "arrows, with single modules": 158,
     "files visited by paper": 55,
     "lines visited by paper": 14_100,
-    "modules of a plan and a picture": 145,
+    "modules of a plan and a picture": 146,
     "imports, % of the code": 8.9,
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 70_670,
+    "lines of tests": 70_900,
 }
 
 BUDGETS = {
-    "_base": (2341, 6),
-    "cli": (3757, 6),
+    "_base": (2786, 6),
+    "cli": (3817, 6),
     "closures": (1681, 6),
     "ext/agent": (2088, 6),
     "ext/fleet": (10313, 11),

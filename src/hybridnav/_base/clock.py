@@ -1,9 +1,11 @@
 """A clock of work: it stands still while kernels are compiled or loaded."""
 
+import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
-from typing import Any
 
 
 class _Spent(threading.local):
@@ -23,25 +25,40 @@ def clock() -> float:
     Differences count. They hold neither compilations nor waiting for those of other threads, by
     this package or by any other code that uses numba.
     """
-    _listen()
+    if "numba.core.event" in sys.modules:  # help can do without, and commands with kept kernels
+        listen()
     return time.perf_counter() - _SPENT.seconds
 
 
+def _stop(_event: object = None) -> None:
+    if _SPENT.depth == 0:
+        _SPENT.began = time.perf_counter()
+    _SPENT.depth += 1
+
+
+def _go_on(_event: object = None) -> None:
+    _SPENT.depth -= 1
+    if _SPENT.depth == 0:
+        _SPENT.seconds += time.perf_counter() - _SPENT.began
+
+
+@contextmanager
+def stopped() -> Iterator[None]:
+    """Stop the clock of this thread."""
+    _stop()
+    try:
+        yield
+    finally:
+        _go_on()
+
+
 @cache
-def _listen() -> None:
-    """Have numba stop the clock, once and not at the import, which help can do without."""
+def listen() -> None:
+    """Have numba stop the clock, once."""
     from numba.core import event  # noqa: PLC0415
 
     class Compiling(event.Listener):
-        def on_start(self, _event: Any) -> None:
-            if _SPENT.depth == 0:
-                _SPENT.began = time.perf_counter()
-            _SPENT.depth += 1
-
-        def on_end(self, _event: Any) -> None:
-            _SPENT.depth -= 1
-            if _SPENT.depth == 0:
-                _SPENT.seconds += time.perf_counter() - _SPENT.began
+        on_start, on_end = staticmethod(_stop), staticmethod(_go_on)
 
     # numba holds this lock while it compiles, and while it looks for kept code.
     event.register("numba:compiler_lock", Compiling())  # type: ignore[no-untyped-call]

@@ -24,9 +24,7 @@ def main() -> None:
     _handle_interrupts(_end_at_once)
     gc.set_threshold(_SOME_OBJECTS)
     try:
-        from hybridnav.cli.app import run  # noqa: PLC0415 - Ctrl-C may come during the imports
-
-        code = run(sys.argv[1:])
+        code = _run(sys.argv[1:])
     except KeyboardInterrupt:
         code = _EXIT_INTERRUPTED
     # The answer is out: an interrupt while Python comes to its end does not change it.
@@ -34,6 +32,20 @@ def main() -> None:
     if "ompl" not in sys.modules:  # its bindings report what nobody took apart
         gc.freeze()  # Python would take every object apart, for a fifth of a plan's time
     sys.exit(code)
+
+
+def _run(words: list[str]) -> int:
+    """Run a command line; Ctrl-C may come during the imports."""
+    if words == ["--help"]:
+        from hybridnav.cli.help import write_help  # noqa: PLC0415
+
+        write_help()
+        return 0
+    from hybridnav._base.jit import run_kept  # noqa: PLC0415
+    from hybridnav.cli.app import run  # noqa: PLC0415
+
+    run_kept()
+    return run(words)
 
 
 def _handle_interrupts(handler: object) -> None:

@@ -23,31 +23,10 @@ from hybridnav.cli.common import (
     complain,
     exit_code,
 )
+from hybridnav.cli.help import HOME_OF, OPENING, VERSION, help_text, names
 from hybridnav.cli.map_options import FloorOptions, check_options
 from hybridnav.cli.warm import notice_of_compiling
 from hybridnav.errors import HybridNavError
-
-_HOME_OF = {
-    "plan": "plan",
-    "closed": "closed",
-    "verify": "show",
-    "show": "show",
-    "rooms": "rooms",
-    "build": "build",
-    "preset": "show",
-    "evaluate": "evaluate",
-    "compare": "evaluate",
-    "judge": "judge",
-}
-"""The module of each command of this package; others are registered."""
-_GROUPS = {
-    "Plan": ("plan", "closed", "verify"),
-    "Look": ("show", "rooms", "view"),
-    "Prepare": ("map", "build", "preset"),
-    "Measure": ("judge", "evaluate", "compare", "explore", "replay"),
-    "Robots and fleets": ("export", "check", "serve"),
-}
-"""The groups of the help; those of other packages stand in one of their own."""
 
 _WrongUsage: Any = typer.BadParameter.__base__
 """click's UsageError: Typer brings a click of its own or not, and names only this subclass."""
@@ -59,7 +38,7 @@ class _Commands(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands."""
         del ctx
-        return [*_HOME_OF, *sorted(extensions("commands"))]
+        return names()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Return a command, None where there is none of the name."""
@@ -69,27 +48,14 @@ class _Commands(TyperGroup):
                 self.add_command(_command(cmd_name, home), cmd_name)
         return super().get_command(ctx, cmd_name)
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """List the commands in groups, by their docstrings: Typer reads their options for a third
-        of a help's time."""
-        names = self.list_commands(ctx)
-        width = max(map(len, names))
-        grouped = {name for group in _GROUPS.values() for name in group}
-        others = [name for name in names if name not in grouped]
-        with formatter.section("Commands"):
-            for title, group in (_GROUPS | {"Others": others}).items():
-                rows = [
-                    (f"{name:<{width}}", _summary_of(name, formatter.width - 8 - width))
-                    for name in group
-                    if name in names
-                ]
-                if rows:
-                    with formatter.section(title):
-                        formatter.write_dl(rows)
+    def get_help(self, ctx: Any) -> str:
+        """Return the help of the program: Typer would load every command for it."""
+        del ctx
+        return help_text().rstrip()
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Refuse an unknown command before Typer loads what checks the options of a known one."""
-        is_ours = not args or args[0].startswith("-") or args[0] in _HOME_OF
+        is_ours = not args or args[0].startswith("-") or args[0] in HOME_OF
         if not is_ours and args[0] not in extensions("commands"):
             for name in self.list_commands(ctx):  # one of them may have been meant
                 self.get_command(ctx, name)
@@ -99,8 +65,8 @@ class _Commands(TyperGroup):
 
 def _home(name: str) -> Any:
     """Return the function of a command, or its group of commands; None where there is none."""
-    if name in _HOME_OF:
-        return getattr(import_module(f"hybridnav.cli.{_HOME_OF[name]}"), name)
+    if name in HOME_OF:
+        return getattr(import_module(f"hybridnav.cli.{HOME_OF[name]}"), name)
     return extension("commands", name) if name in extensions("commands") else None
 
 
@@ -125,13 +91,6 @@ class _Command(TyperCommand):
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
-
-
-def _summary_of(name: str, most: int) -> str:
-    """Return the first sentence of a command's help, cut after some letters."""
-    home = _home(name)
-    text = home.info.help if isinstance(home, typer.Typer) else home.__doc__
-    return TyperCommand(name, help=inspect.cleandoc(text or "")).get_short_help_str(most)
 
 
 def _command(name: str, home: Any) -> Any:
@@ -162,7 +121,7 @@ def _command(name: str, home: Any) -> Any:
 app = typer.Typer(
     cls=_Commands,
     name="hybridnav",
-    help="Robot routes planned on an occupancy grid and the topological map grown out of it.",
+    help=OPENING,
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,  # rich takes [m] for markup
@@ -177,9 +136,7 @@ def _print_version(wanted: bool) -> None:  # noqa: FBT001 - called by Typer
 
 VersionOption = Annotated[
     bool,
-    typer.Option(
-        "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
-    ),
+    typer.Option("--version", callback=_print_version, is_eager=True, help=VERSION),
 ]
 
 

@@ -59,7 +59,7 @@ class _Teller(logging.Handler):
         before, seconds = self._spent_s, record.__dict__.get("seconds", 0.0)
         self._spent_s += seconds if record.__dict__.get("is_kept") else 0.0
         if before < _PATIENCE_S <= self._spent_s:
-            from hybridnav._base.jit import is_for_another_numba  # noqa: PLC0415 - loads numba
+            from hybridnav._base.shipped import is_for_another_numba  # noqa: PLC0415 - loads numba
 
             complain(_FIRST + _NOT_MINE * is_for_another_numba())
 

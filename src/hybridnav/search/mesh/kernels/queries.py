@@ -1,9 +1,8 @@
 """Kernels of queries on a mesh, one or many: by intervals, or by a graph of its corners."""
 
 import numpy as np
-from numba.extending import overload
 
-from hybridnav._base.jit import guarded, njit
+from hybridnav._base.jit import guarded, njit, overload
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.hierarchy_search import query_hierarchy

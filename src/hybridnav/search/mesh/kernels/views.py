@@ -12,9 +12,8 @@ exact and never exceed the distance.
 import math
 
 import numpy as np
-from numba.extending import overload
 
-from hybridnav._base.jit import guarded, njit
+from hybridnav._base.jit import guarded, njit, overload
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.contraction import pack
 from hybridnav.search.mesh.kernels.state import Target, Targets, ViewRoom
