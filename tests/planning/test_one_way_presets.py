@@ -25,6 +25,19 @@ def test_a_diagonal_beside_a_blocked_cell_goes_round_its_corner_by_the_other():
     assert list(faults(scene, "shortest")) == []
 
 
+@pytest.mark.parametrize(
+    "seed",
+    [
+        470,  # an end at a corner of cells, whose cell lies behind it
+        684,  # a line along a side, beside which the other cell was listed
+    ],
+)
+def test_robot_starts_and_ends_in_the_cells_of_its_ends(seed):
+    scene = random_scene(seed)
+    assert scene is not None
+    assert not list(faults(scene, "robot"))
+
+
 def test_shortest_answers_many_pairs_and_tables_as_it_answers_each():
     scene = random_scene(24, n_ends=7)
     assert scene is not None

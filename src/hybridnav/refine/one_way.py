@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Protocol
@@ -164,11 +164,14 @@ def wrong_at(
             inside = _open(free, *_ahead(last, (last[0] - first[0], last[1] - first[1]), -1))
             continue
         for at, ahead in _runs_of(first, last):
-            reached = _spread(one_way, inside, _open(free, *at))
+            beside = _open(free, *at)
+            # At its start the line has not come through the point.
+            between = () if inside == {ends[0]} and first == points[0] else beside
+            reached = _spread(one_way, inside, beside, between)
             inside = reached & _open(free, *ahead)
             if not inside:
                 return min(reached, default=ends[0])
-    reached = _spread(one_way, inside, _open(free, *map(_touched, points[-1])))
+    reached = _spread(one_way, inside, _open(free, *map(_touched, points[-1])), ())
     return None if ends[1] in reached else ends[1]
 
 
@@ -179,6 +182,8 @@ def _near(one_way: DirectedSides, line: FloatArray) -> list[bool]:
     first, last = sides.min(axis=1), sides.max(axis=1) + 1
     met = (low[:, None] <= last) & (high[:, None] >= first)
     near: BoolArray = met.all(axis=2).any(axis=1)
+    for k in (0, -1):  # an end on a side may be beside its cell
+        near[k] |= (line[k] % 1 == 0).any()
     found: list[bool] = near.tolist()
     return found
 
@@ -194,14 +199,19 @@ def _open(free: AnyArray, rows: Span, cols: Span) -> set[Cell]:
     }
 
 
-def _spread(one_way: DirectedSides, inside: Iterable[Cell], cells: set[Cell]) -> set[Cell]:
-    """Return which of the free cells at a point are reached from some of them."""
+def _spread(
+    one_way: DirectedSides, inside: Iterable[Cell], cells: set[Cell], between: Collection[Cell]
+) -> set[Cell]:
+    """Return which of the free cells at a point are reached from some of them.
+
+    `between`: these cells where the line leads through the point, none at an end of it.
+    """
     reached = set(inside) & cells
     todo = list(reached)
     while todo:
         row, col = todo.pop()
         for to in cells - reached:
-            if one_way.allows((row, col), to, between=cells):
+            if one_way.allows((row, col), to, between=between):
                 reached.add(to)
                 todo.append(to)
     return reached
