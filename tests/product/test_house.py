@@ -29,7 +29,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 70_900,
+    "lines of tests": 71_250,
 }
 
 BUDGETS = {
@@ -43,7 +43,7 @@ BUDGETS = {
     "graphs": (6570, 6),
     "guide": (3682, 10),
     "harness": (9848, 9),
-    "maps": (5319, 6),
+    "maps": (5325, 6),
     "models": (2152, 6),
     "planning": (6868, 9),
     "pyramid": (4445, 9),
@@ -53,7 +53,7 @@ BUDGETS = {
     "route": (1047, 6),
     "search": (12060, 9),
     "topology": (716, 6),
-    "viz": (5332, 6),
+    "viz": (5405, 6),
 }
 """Lines of each package at most, and floors in it: 6 are wanted, where there are more none is
 added."""

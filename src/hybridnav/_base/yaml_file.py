@@ -96,10 +96,14 @@ def read_marked(
     `path`, `what`, `error`, `missing`, `limits`: see `read_yaml`. Raises `HybridNavError`: of the
     type `error` or `missing`, as by `read_yaml`.
     """
-    where = f"{what} {printable(path)}"
     text = read_text(
         path, what=what, error=error, missing=missing, max_bytes=limits.max_bytes, kind="YAML"
     )
+    return marked_of(text, f"{what} {printable(path)}", error, limits)
+
+
+def marked_of(text: str, where: str, error: type[HybridNavError], limits: Limits) -> Marked:
+    """Return the YAML mapping of a text; see `read_marked`, and `parse_document`."""
     data, root = _constructed(text, where, error, limits)
     if not isinstance(data, dict):
         given = "nothing" if data is None else brief(data)

@@ -52,8 +52,8 @@ ToleranceOption = Annotated[
     float | None,
     option(
         "--tolerance D",
-        "How far outlines may lie from the cells, in metres, before they are straightened.",
-        show_default="the least with which the file has at most 20 kB",
+        "How coarse outlines are: a corner goes if it cuts off less than D x D m².",
+        show_default="0.3",
     ),
 ]
 AllOption = Annotated[

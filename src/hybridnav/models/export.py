@@ -102,7 +102,7 @@ def export_rooms(
     rooms: Rooms,
     path: PathLike,
     *,
-    tolerance_m: float = 0.05,
+    tolerance_m: float = 0.3,
     frame: str = "map",
     everything: bool = False,
 ) -> None:
@@ -121,8 +121,7 @@ def export_rooms(
     path
         The file, ending in .csv or .geojson; one that exists is replaced.
     tolerance_m
-        How far outlines may lie from the steps of the cells, in metres, before they are brought
-        into line with walls, as in `save_rooms`.
+        How coarse outlines are, in metres, as in `save_rooms`.
     frame
         Name of the map frame, in GeoJSON.
     everything
@@ -153,7 +152,7 @@ def export_rooms(
     file = _checked(path, _MAP_ENDINGS, frame)
     # These load scipy and shapely.
     from hybridnav.rooms.files.entries import Read  # noqa: PLC0415
-    from hybridnav.rooms.files.outlines import Outlines  # noqa: PLC0415
+    from hybridnav.rooms.files.outlines import outlines_of  # noqa: PLC0415
     from hybridnav.rooms.files.read import check_rooms  # noqa: PLC0415
 
     read = Read(f"rooms {printable(file)}", list(rooms.names))
@@ -164,7 +163,7 @@ def export_rooms(
     if file.suffix.lower() == _TABLE:
         _write(file, _table(_ROOM, (_texts(room) for room in known)))
         return
-    outlines = Outlines(rooms.labels.label_of, len(rooms.names), rooms.grid).within(tolerance_m)
+    outlines = outlines_of(rooms.labels.label_of, len(rooms.names), rooms.grid, tolerance_m)
     features = [
         _feature({"feature": "room"} | room, _area(rings))
         for room, rings in zip(known, itertools.compress(outlines, shown), strict=True)

@@ -138,6 +138,7 @@ def test_a_journal_that_makes_no_sense_is_no_obstacle(folder: Path, text: str) -
 def test_links_out_of_the_folder_are_not_followed(folder: Path) -> None:
     outside = folder.parent / "outside.yaml"
     (folder / "rooms.yaml").rename(outside)
+    (folder / "rooms.cells.png").rename(outside.with_name("rooms.cells.png"))
     (folder / "rooms.yaml").symlink_to(outside)
     with pytest.raises(hn.errors.RoomsError, match="leads out of"):
         session_of(folder / "four.yaml")
@@ -154,6 +155,16 @@ def test_a_link_made_later_is_not_followed_either(client: Client, folder: Path) 
         client.post("floor/0/save", {"version": 0}).code,
     ]
     assert all(code >= 400 for code in codes)
+    assert victim.read_text(encoding="utf-8") == "precious"
+
+
+def test_an_image_of_cells_that_is_a_link_is_not_followed(client: Client, folder: Path) -> None:
+    victim = folder.parent / "victim.png"
+    victim.write_text("precious", encoding="utf-8")
+    (folder / "rooms.cells.png").unlink()
+    (folder / "rooms.cells.png").symlink_to(victim)
+    assert _rename(client, 0, "a", "kitchen").code == 200
+    assert client.post("floor/0/save", {"version": 1}).code >= 400
     assert victim.read_text(encoding="utf-8") == "precious"
 
 

@@ -185,8 +185,8 @@ def test_a_thousand_rooms_that_are_written_are_read_again(tmp_path):
 
 
 def test_more_rooms_than_can_be_read_are_not_written(tmp_path):
-    grid, rooms = blocks(80)
-    with pytest.raises(hn.errors.RoomsError, match="6400 rooms take"):
+    grid, rooms = blocks(88)
+    with pytest.raises(hn.errors.RoomsError, match="7744 rooms take"):
         hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
     assert not (tmp_path / "rooms.yaml").exists()
 

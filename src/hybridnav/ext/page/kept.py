@@ -19,6 +19,7 @@ from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.names import folded, matching
 from hybridnav.planning import Profile
 from hybridnav.rooms.files import save_rooms
+from hybridnav.rooms.files.cells import cells_file
 
 # The profiles, and what is out of order until it is opened again.
 
@@ -120,6 +121,7 @@ class RoomsFile:
         Raises `RoomsError` when the file cannot be written; the old one and the journal stay.
         """
         self._check_inside(self.path)
+        self._check_inside(cells_file(self.path))
         save_rooms(self.path, rooms, grid)
         self._seen = self._digest()
         with suppress(OSError):

@@ -18,7 +18,7 @@ from hybridnav.ext.fleet import BuildingPlan
 from hybridnav.guide.words import Instruction, sentences
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels, RoomUse
 from hybridnav.planning import PlanResult
-from hybridnav.rooms.files.outlines import Outlines
+from hybridnav.rooms.files.outlines import outlines_of
 from hybridnav.rooms.files.paint import cells_inside
 
 _FAR = 1e7
@@ -221,8 +221,6 @@ def checked_change(value: dict[str, Any]) -> Change:
 
 # Changes of rooms: names, unions, cuts along a line, corners of outlines.
 
-TOLERANCE_M = 0.1
-"""How far the outlines whose corners are moved may lie from the cells."""
 _NEAR = 1.0
 """Grid units within which a corner is meant."""
 
@@ -251,9 +249,7 @@ def changed(rooms: RoomLabels, change: Change, grid: OccupancyGrid) -> RoomLabel
 
 def rings_of(rooms: RoomLabels, grid: OccupancyGrid) -> list[list[list[list[float]]]]:
     """Return the outline of each room, rings of corners `[column, row]` in grid units."""
-    if not rooms.names:
-        return []
-    outlines = Outlines(rooms.label_of, len(rooms.names), grid).within(TOLERANCE_M)
+    outlines = outlines_of(rooms.label_of, len(rooms.names), grid)
     return [
         [np.round(grid.frame.positions_of(ring)[:, ::-1], 3).tolist() for ring in rings]
         for rings in outlines

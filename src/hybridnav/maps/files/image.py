@@ -7,8 +7,8 @@ import struct
 import threading
 import warnings
 import zlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
 import numpy as np
@@ -37,11 +37,13 @@ class Raster:
     """Brightness of an image.
 
     `level`: the grey of the file, of 8 or 16 bits by its type, shape `(rows, cols)`, the top row
-    first; `opaque`: mask of the fully opaque pixels, same shape; None if all are opaque.
+    first; `opaque`: mask of the fully opaque pixels, same shape; None if all are opaque; `text`:
+    what a PNG says of itself, by keyword.
     """
 
     level: NDArray[np.uint8] | NDArray[np.uint16]
     opaque: BoolArray | None
+    text: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def grey(self) -> ByteArray:
@@ -73,7 +75,7 @@ def read_raster(path: PathLike, *, what: str, check_size: Callable[[int, int], N
         try:
             if image.format == "PNG":
                 check_png(stream)
-            return _decode(image)
+            return replace(_decode(image), text=dict(getattr(image, "text", {})))
         except DamagedPngError as failure:
             raise MapError(f"{where}: damaged PNG: {failure}; save or copy it again") from None
         except _UnsupportedPixelsError as failure:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from scipy import ndimage
@@ -11,7 +11,7 @@ from hybridnav._base.rows import in_runs, unique_rows
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import RoomsError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid
-from hybridnav.rooms.files.entries import NAMELESS, Missed, Outline, Read, Runs
+from hybridnav.rooms.files.entries import Outline, Read
 
 _MOST_PAINTED = 4
 """Most times that outlines may cover the map."""
@@ -22,88 +22,34 @@ _MOST_CROSSINGS = 5_000_000
 cross some ten thousand."""
 
 
-def painted(read: Read, missed: Missed, grid: OccupancyGrid) -> IntArray:
+def outlined(read: Read, outlines: Sequence[Outline], grid: OccupancyGrid) -> IntArray:
     """Return for each cell the room whose outline contains its centre, by the even-odd rule.
 
-    Outlines that were written with their cells come first, corrected by the cells that they miss,
-    then the outlines that a person has drawn or changed, in the order of the file: each takes the
-    cells that it contains from those before.
+    In the order of the file, each outline takes the cells that it contains from those before.
 
-    `read`: the outlines, which may cross themselves and others; `missed`: the cells that outlines
-    miss; an outline whose fingerprint it lacks was drawn by hand. Returns int32 (rows, cols), -1
-    for no room. Raises `RoomsError` when the outlines have too many sides, or cover too much, for
-    rooms.
+    `read`: the file; `outlines`: some of its outlines, which may cross themselves and others.
+    Returns int32 (rows, cols), -1 for no room. Raises `RoomsError` when the outlines have too many
+    sides, or cover too much, for rooms.
     """
-    written, by_hand = outlined(read, missed.runs_of, grid)
-    outlines = [each for each in read.outlines if each.fingerprint in missed.runs_of]
-    if missed.by_rule and outlines:
-        written[apart(grid)] = NO_ROOM
-        _give(written, outlines, missed.runs_of)
-        written = by_rule(np.where(by_hand == NO_ROOM, written, np.int32(NO_ROOM)), grid)
-    _give(written, outlines, missed.runs_of)
-    return np.where(by_hand == NO_ROOM, written, by_hand)
-
-
-def outlined(
-    read: Read, written: Collection[int], grid: OccupancyGrid
-) -> tuple[IntArray, IntArray]:
-    """Paint the outlines alone: those that were written, and those drawn by hand.
-
-    `read`, `grid`: see `painted`; `written`: fingerprints of outlines that were written. Returns
-    int32 (rows, cols) each, -1 for no room. Raises `RoomsError` as by `painted`.
-    """
-    n_crossings = sum(_n_crossings(ring) for outline in read.outlines for ring in outline.rings)
+    n_crossings = sum(_n_crossings(ring) for outline in outlines for ring in outline.rings)
     if n_crossings > _MOST_CROSSINGS:
         raise RoomsError(
             f"{read.where}: the outlines cross {n_crossings:,} rows of the map in all, "
             f"at most {_MOST_CROSSINGS:,} are read"
         )
-    found = [np.full(grid.shape, NO_ROOM, dtype=np.int32) for _ in range(2)]
+    room_of = np.full(grid.shape, NO_ROOM, dtype=np.int32)
     n_painted = 0
     # In the form with locations the first one keeps its cells.
-    for outline in read.outlines if read.lines else reversed(read.outlines):
+    for outline in outlines if read.lines else reversed(outlines):
         cells = cells_inside(outline.rings, grid.shape)
         n_painted += len(cells)
-        if n_painted > _MOST_PAINTED * found[0].size:
+        if n_painted > _MOST_PAINTED * room_of.size:
             raise RoomsError(
                 f"{read.of(outline.room, outline.line)}: the outlines up to here cover the map "
                 f"more than {_MOST_PAINTED} times: remove rooms that lie in others"
             )
-        found[outline.fingerprint not in written].ravel()[cells] = outline.room
-    return found[0], found[1]
-
-
-def apart(grid: OccupancyGrid) -> BoolArray:
-    """Return the free cells that are below a square metre in one piece, bool (rows, cols).
-
-    Rooms that are found have none of them. An outline of few corners runs across many, and doors
-    would lead from the part inside into the part outside.
-    """
-    part_of, _ = ndimage.label(grid.measured == CellClass.FREE)
-    side_m = grid.resolution_m
-    small = np.bincount(part_of.ravel()) * (side_m * side_m) < _LEAST_NAMELESS_M2
-    small[0] = False
-    return small[part_of]
-
-
-def by_rule(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
-    """Return labels of which those of free cells are kept, and reach into walls as rooms that are
-    found do."""
-    # Loads scipy and numba.
-    from hybridnav.rooms.find import reaching  # noqa: PLC0415
-
-    is_free = grid.measured == CellClass.FREE
-    free = np.where(is_free, label_of, np.int32(NO_ROOM))
-    return np.where(is_free, label_of, reaching(free, grid))
-
-
-def _give(label_of: IntArray, written: Sequence[Outline], runs_of: Mapping[int, Runs]) -> None:
-    """Give the cells that outlines miss to their rooms, and take away those of no room."""
-    flat = label_of.ravel()
-    if NAMELESS in runs_of:
-        flat[in_runs(*runs_of[NAMELESS])] = NO_ROOM
-    for outline in written:
-        flat[in_runs(*runs_of[outline.fingerprint])] = outline.room
+        room_of.ravel()[cells] = outline.room
+    return room_of
 
 
 def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[int]) -> IntArray:
@@ -119,12 +65,33 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[i
     """
     if not rooms:
         return label_of
-    nameless = (grid.measured == CellClass.FREE) & (label_of == NO_ROOM)
+    is_free = grid.measured == CellClass.FREE
+    free = np.where(is_free, label_of, np.int32(NO_ROOM))
+    below = _LEAST_NAMELESS_M2 / grid.cell_area_m2
+    filled = with_small_parts(free, is_free & (free == NO_ROOM), below, rooms=rooms)
+    return np.where(is_free, filled, label_of)
+
+
+def with_small_parts(
+    label_of: IntArray,
+    nameless: BoolArray,
+    below_cells: float,
+    *,
+    rooms: Collection[int] | None = None,
+    spared: BoolArray | None = None,
+) -> IntArray:
+    """Assign small connected sets of cells to the rooms with which they have the longest border.
+
+    `nameless`: bool (rows, cols), the cells to assign, of no room in `label_of`; `below_cells`:
+    number below which a set is small; `rooms`: only sets beside one of them are assigned, None for
+    all; `spared`: cells whose sets are not. Result: the labels with these.
+    """
     part_of, n_parts = ndimage.label(nameless)
-    cells = np.bincount(part_of.ravel(), minlength=n_parts + 1)
-    small = cells * grid.cell_area_m2 < _LEAST_NAMELESS_M2
+    small = np.bincount(part_of.ravel(), minlength=n_parts + 1) < below_cells
     small[0] = False
-    taken = np.where((grid.measured == CellClass.FREE), label_of, np.int32(NO_ROOM))
+    if spared is not None:
+        small[part_of[spared]] = False
+    inside = small[part_of]
     pairs = []
     for one, other in (
         (np.s_[:, :-1], np.s_[:, 1:]),
@@ -132,15 +99,16 @@ def without_slivers(label_of: IntArray, grid: OccupancyGrid, rooms: Collection[i
         (np.s_[:-1], np.s_[1:]),
         (np.s_[1:], np.s_[:-1]),
     ):
-        beside = small[part_of[one]] & (taken[other] != NO_ROOM)
-        pairs.append(np.stack([part_of[one][beside], taken[other][beside]], axis=1))
+        beside = inside[one] & (label_of[other] != NO_ROOM)
+        pairs.append(np.stack([part_of[one][beside], label_of[other][beside]], axis=1))
     found, _, _, length = unique_rows(np.concatenate(pairs))
-    is_beside = np.isin(found[:, 0], found[np.isin(found[:, 1], list(rooms)), 0])
-    found, length = found[is_beside], length[is_beside]
+    if rooms is not None:
+        is_beside = np.isin(found[:, 0], found[np.isin(found[:, 1], list(rooms)), 0])
+        found, length = found[is_beside], length[is_beside]
     room_of = np.full(n_parts + 1, NO_ROOM, dtype=np.int32)
     order = np.lexsort((-found[:, 1], length))  # the last one written counts
     room_of[found[order, 0]] = found[order, 1]
-    return np.where(nameless, room_of[part_of], label_of)
+    return np.where(inside, room_of[part_of], label_of)
 
 
 def cells_inside(rings: Sequence[FloatArray], shape: tuple[int, int]) -> LongArray:

@@ -23,6 +23,8 @@ from hybridnav.maps.files.image import read_raster
 from hybridnav.maps.names import check_names
 from hybridnav.maps.occupancy import extent
 from hybridnav.maps.room_labels import Point
+from hybridnav.rooms.files.cells import CellImage, read_image
+from hybridnav.rooms.files.earlier import PackedCells, unpacked
 from hybridnav.rooms.files.entries import (
     LIMITS,
     Outline,
@@ -32,9 +34,8 @@ from hybridnav.rooms.files.entries import (
     list_of,
     number_of,
     read_entries,
-    unpacked,
 )
-from hybridnav.rooms.files.paint import cells_inside, painted, without_slivers
+from hybridnav.rooms.files.paint import cells_inside, outlined, without_slivers
 
 
 def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
@@ -53,10 +54,10 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         points. `doors:` is a mapping from numbers of doors to a point [x, y] of the boundary, or a
         list with `number` and `point`. The door nearest to it, within a metre, keeps the number.
         `one_way:` is a list of rules as text, such as `door:5=corridor`; see `OneWayRule`.
-        `cells:` holds cells that written outlines miss. In the other form `locations:` is a list of
-        names. Beside it stands an image `data:` of the size of the map's, whose pixel values index
-        the list, or flat `polygons:` in pixels of that image. Polygons win if both are present, and
-        the first of overlapping ones.
+        `cells:` names the image of the cells of written outlines. In the other form `locations:` is
+        a list of names. Beside it stands an image `data:` of the size of the map's, whose pixel
+        values index the list, or flat `polygons:` in pixels of that image. Polygons win if both are
+        present, and the first of overlapping ones.
     grid
         The map.
 
@@ -92,6 +93,7 @@ def load_rooms(path: PathLike, grid: OccupancyGrid) -> RoomLabels:
         read = _locations(values, Path(path), where, grid)
     elif "rooms" in values:
         read = read_entries(marked, where, grid)
+        read.folder = Path(path).resolve().parent
     else:
         raise RoomsError(f"{where}: lacks rooms, or locations")
     return rooms_of(read, grid)
@@ -116,14 +118,28 @@ def rooms_of(read: Read, grid: OccupancyGrid) -> RoomLabels:
 
 
 def labels_of(read: Read, grid: OccupancyGrid) -> IntArray:
-    """Return the room of each cell by the outlines and seeds of a file, int32 (rows, cols)."""
-    missed = unpacked(read.cells, read.where, grid)
-    label_of = painted(read, missed, grid)
+    """Return the room of each cell by the outlines, cells and seeds of a file, int32 (rows, cols).
+
+    Outlines that were written have the cells that were written with them; those that a person has
+    drawn or changed take the cells that they contain.
+    """
+    cells: CellImage | PackedCells = PackedCells({})
+    if read.cells:
+        packed = None if isinstance(read.cells, str) else read.cells
+        cells = read_image(read, grid) if packed is None else unpacked(packed, read.where, grid)
+    by_hand = [each for each in read.outlines if each.fingerprint not in cells.written]
+    drawn = outlined(read, by_hand, grid)
+    if isinstance(cells, CellImage):
+        written = cells.label_of
+    else:
+        others = [each for each in read.outlines if each.fingerprint in cells.written]
+        written = cells.labels(outlined(read, others, grid), others, drawn, grid)
+    label_of = np.where(drawn == NO_ROOM, written, drawn)
     if read.seeds:
         label_of = _seeded(read, label_of, grid)
     if read.lines:
-        by_hand = {o.room for o in read.outlines if o.fingerprint not in missed.runs_of}
-        label_of = without_slivers(label_of, grid, by_hand | set(read.seeds))
+        rooms = {each.room for each in by_hand} | set(read.seeds)
+        label_of = without_slivers(label_of, grid, rooms)
     return label_of
 
 

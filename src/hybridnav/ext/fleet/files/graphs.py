@@ -154,7 +154,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     name: str,
     elevation_m: float | None = None,
     links: Sequence[Link] = (),
-    tolerance_m: float = 0.05,
+    tolerance_m: float = 0.3,
 ) -> FloorGraph:
     """Return the graph of a floor with all that its map knows, for `BuildingGraph`.
 
@@ -175,8 +175,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
         Links of the building. Their ends on this floor become nodes, joined to the nearest node in
         sight.
     tolerance_m
-        How far outlines of rooms may lie from the steps of the cells, in metres, as in
-        `save_rooms`.
+        How coarse outlines of rooms are, in metres, as in `save_rooms`.
 
     Returns
     -------
@@ -363,13 +362,13 @@ def _areas(rooms: Rooms, tolerance_m: float) -> list[FloorArea]:
     import shapely  # noqa: PLC0415 - rooms alone need it
 
     from hybridnav.rooms.files.entries import Read  # noqa: PLC0415
-    from hybridnav.rooms.files.outlines import Outlines  # noqa: PLC0415 - loads scipy
+    from hybridnav.rooms.files.outlines import outlines_of  # noqa: PLC0415 - loads scipy
     from hybridnav.rooms.files.read import check_rooms  # noqa: PLC0415
 
     check_rooms(
         Read(f"map {rooms.grid.name}", list(rooms.names)), rooms.labels.label_of, rooms.grid
     )
-    outlines = Outlines(rooms.labels.label_of, len(rooms.names), rooms.grid).within(tolerance_m)
+    outlines = outlines_of(rooms.labels.label_of, len(rooms.names), rooms.grid, tolerance_m)
     areas = []
     for name, rings in zip(rooms.names, outlines, strict=True):
         largest = max(rings, key=lambda ring: shapely.Polygon(ring).area)
