@@ -7,11 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from hybridnav._base.rows import unique_rows
-from hybridnav._base.typing import ByteArray, IntArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels
+from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
 from hybridnav.rooms import Door, Rooms
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
@@ -19,7 +18,7 @@ from hybridnav.viz.canvas import MAX_HEIGHT, Canvas, draw_cells, known_view, new
 from hybridnav.viz.labels import RoomWriter
 from hybridnav.viz.layout import Entry, finish_with_axes
 from hybridnav.viz.maps import draw_one_way, ground_entries, swatch
-from hybridnav.viz.places import colour_vertices
+from hybridnav.viz.room_colours import colour_rooms
 
 _AROUND, _PANEL = 0.1, 0.46
 """Height of titles and legends of two maps, and width of each, as shares of the whole width."""
@@ -34,6 +33,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     ax: Axes | None = None,
     names: bool = True,
     everything: bool = False,
+    like: TopologicalMap | None = None,
     title: str | None = None,
     width_in: float = style.FULL_WIDTH_IN,
 ) -> Axes:
@@ -60,6 +60,9 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         Whether to write the names.
     everything
         Whether to draw all rooms and doors, not only listed ones.
+    like
+        Another map of the building with rooms, as before names were carried: rooms of one name have
+        one colour, if it is drawn `like` this map.
     title
         Title instead of the map's name and the count of rooms; empty for none.
     width_in
@@ -86,7 +89,8 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     """
     view, labels, grid = _view_of(rooms, grid, everything=everything)
     canvas = Canvas.opened(ax, width_in, known_view(grid))
-    draw_room_cells(canvas, labels, grid)
+    others = () if like is None else (_view_of(like, None, everything=everything)[1],)
+    ground = draw_room_cells(canvas, labels, grid, *others)
     words = [grid.name, f"{len(labels.names)} rooms"]
     writer = RoomWriter(canvas, grid, labels)
     doors: list[Door] = []
@@ -107,7 +111,7 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
         doors.sort(key=lambda door: (door.is_opening, -door.width_m))
         writer.number_doors(doors)
     entries += draw_one_way(canvas, rooms) if isinstance(rooms, TopologicalMap) else []
-    entries += [*ground_entries(grid), *key]
+    entries += [*ground, *key]
     finish_with_axes(canvas, entries, words if title is None else [title])
     return canvas.ax
 
@@ -120,6 +124,8 @@ def plot_rooms_beside(
     width_in: float = 2 * style.FULL_WIDTH_IN,
 ) -> Axes:
     """Draw the rooms of two maps beside each other, such as before and after names were carried.
+
+    Rooms of one name have one colour on both.
 
     Parameters
     ----------
@@ -155,8 +161,8 @@ def plot_rooms_beside(
         figure = new_figure(width_in, _AROUND + _PANEL * min(MAX_HEIGHT, height))
         axes = figure.subplots(1, 2)
         figure.subplots_adjust(left=0.04, right=0.99, bottom=0.17, top=0.94, wspace=0.1)
-    for ax, each in zip(axes, (old, new), strict=True):
-        plot_rooms(each, ax=ax)
+    for ax, each, other in zip(axes, (old, new), (new, old), strict=True):
+        plot_rooms(each, ax=ax, like=other)
     return axes[1]
 
 
@@ -187,30 +193,30 @@ def _view_of(
 
 
 def draw_room_cells(
-    canvas: Canvas, labels: RoomLabels, grid: OccupancyGrid, *, strength: float = 1.0
-) -> None:
-    """Draw the map with each room in a colour of some strength."""
-    colours = _colours(labels.label_of, len(labels.names), strength)
-    draw_cells(canvas, grid, labels.label_of, colours)
+    canvas: Canvas,
+    labels: RoomLabels,
+    grid: OccupancyGrid,
+    *others: RoomLabels,
+    strength: float = 1.0,
+) -> list[Entry]:
+    """Draw the map with each room in a colour of some strength; return the legend's entries of
+    cells in no room.
+
+    `others`: see `colour_rooms`.
+    """
+    index = colour_rooms(labels, grid, *others)
+    rooms = style.rgb(*style.PLACES, strength=strength)[index]
+    colours = np.concatenate([rooms, style.rgb(style.UNEXPLORED, style.FREE)])
+    is_unexplored = grid.measured == CellClass.UNEXPLORED
+    draw_cells(canvas, grid, np.where(is_unexplored, len(rooms), labels.label_of), colours)
+    entry: Entry = (Patch(fc=style.UNEXPLORED), "unexplored")
+    return [entry] * bool(is_unexplored.any()) + ground_entries(grid)
 
 
 def room_entry(left_out: int, strength: float = 1.0) -> Entry:
     """Return the legend's entry for rooms, with the number of those without names."""
     text = f"rooms ({left_out} without their name)" if left_out else "rooms"
     return swatch(style.PLACES, strength), text
-
-
-def _colours(label_of: IntArray, n_rooms: int, strength: float) -> ByteArray:
-    """Return RGB per room and one row more, white for no room."""
-    pairs = [np.empty((0, 2), dtype=np.int64)]
-    for tail, head in ((label_of[:, :-1], label_of[:, 1:]), (label_of[:-1], label_of[1:])):
-        between = (tail != head) & (tail != NO_ROOM) & (head != NO_ROOM)
-        pairs.append(np.stack([tail[between], head[between]], axis=1))
-    arcs = unique_rows(np.concatenate(pairs)).rows.astype(np.int32)
-    index = colour_vertices(arcs, n_rooms)
-    return np.concatenate(
-        [style.rgb(*style.PLACES, strength=strength)[index], style.rgb(style.FREE)]
-    )
 
 
 def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> list[Entry]:

@@ -238,7 +238,7 @@ def _draw_ground(
         entry: Entry = (swatch(style.PLACES, style.PALE), "places")
         return [entry, *ground_entries(grid)], LabelPlacer(canvas)
     rooms = topology.rooms
-    draw_room_cells(canvas, rooms.listed_labels, grid, strength=strength)
+    ground = draw_room_cells(canvas, rooms.listed_labels, grid, strength=strength)
     passed = list({leg.door.number: leg.door for leg in legs if leg.door is not None}.values())
     doors = _drawn_doors(rooms, passed)
     writer = RoomWriter(canvas, grid, rooms.listed_labels)
@@ -250,7 +250,7 @@ def _draw_ground(
     named_first = {leg.room for leg in legs if leg.room is not None}
     left_out = writer.write_names(named_first, lines=lines)
     entries: list[Entry] = [room_entry(left_out, strength), *draw_doors(canvas, doors)]
-    return entries + ground_entries(grid), writer.labels
+    return entries + ground, writer.labels
 
 
 def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:

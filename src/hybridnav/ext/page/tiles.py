@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib import colormaps
 from PIL import Image
 
-from hybridnav._base.typing import BoolArray, ByteArray, IntArray
+from hybridnav._base.typing import BoolArray, ByteArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.costs import CostLayer
@@ -21,6 +21,7 @@ from hybridnav.pyramid import Level
 from hybridnav.viz import style
 from hybridnav.viz.moving import heights_of
 from hybridnav.viz.places import colour_vertices
+from hybridnav.viz.room_colours import colour_rooms
 
 Theme = Literal["light", "dark"]
 
@@ -163,23 +164,13 @@ def level_layer(level: Level) -> MapLayer:
 
 def rooms_layer(labels: RoomLabels, grid: OccupancyGrid) -> MapLayer:
     """Return the layer of the rooms, neighbours in different colours."""
-    colours = colour_vertices(_beside(labels), len(labels.names))
+    colours = colour_rooms(labels, grid)
     index = _ground(grid)
     measured = grid.measured
     for kind, first in ((CellClass.FREE, _PLACES), (CellClass.UNEXPLORED, _UNEXPLORED_PLACES)):
         inside: BoolArray = (measured == kind) & (labels.label_of != NO_ROOM)
         index[inside] = (colours[labels.label_of[inside]] + first).astype(np.uint8)
     return _layer(index)
-
-
-def _beside(labels: RoomLabels) -> IntArray:
-    """Return the pairs of rooms that touch, int32 (n, 2)."""
-    of, n_rooms, pairs = labels.label_of, max(len(labels.names), 1), []
-    for tail, head in ((of[:, :-1], of[:, 1:]), (of[:-1], of[1:])):
-        between = (tail != head) & (tail != NO_ROOM) & (head != NO_ROOM)
-        pairs.append(np.unique(tail[between].astype(np.int64) * n_rooms + head[between]))
-    both = np.unique(np.concatenate(pairs))
-    return np.stack(np.divmod(both, n_rooms), axis=1).astype(np.int32)
 
 
 def cost_table(closed: bool) -> ByteArray:  # noqa: FBT001 - a colour more or not
