@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,10 +39,28 @@ class Scene:
     """int (n, 4), from where to where each may be crossed."""
     ends: list[End]
 
-    @property
+    @cached_property
     def plane(self) -> OneWayPlane:
         """The map as the oracle takes it."""
         return OneWayPlane(self.free, self.sides)
+
+    @cached_property
+    def topology(self) -> hn.TopologicalMap:
+        """The map as planners take it; a cell measures a metre."""
+        grid = occupancy_grid(self.free.astype(np.uint8))
+        return hn.TopologicalMap(hn.DualGraphPyramid.build(grid))
+
+    @cached_property
+    def placed(self) -> list[End]:
+        """The ends by the cells that planners look for, above an end on a side; free ones."""
+        found = [((int(point[0]), int(point[1])), point) for _, point in self.ends]
+        rows, cols = self.free.shape
+        return [(at, p) for at, p in found if at[0] < rows and at[1] < cols and self.free[at]]
+
+    @cached_property
+    def lengths(self) -> NDArray[np.float64]:
+        """Lengths of shortest any-angle paths between all placed ends."""
+        return self.plane.lengths(self.placed, self.placed) if self.placed else np.empty((0, 0))
 
 
 def random_scene(seed: int, *, side: int = 7, n_ends: int = 3) -> Scene | None:
@@ -83,31 +102,24 @@ def _line(rng: np.random.Generator, rows: int, cols: int) -> list[tuple[int, ...
 
 
 def planner_of(scene: Scene, preset: str) -> hn.HybridPlanner:
-    """A planner on the map, whose cells measure a metre."""
-    grid = occupancy_grid(scene.free.astype(np.uint8))
-    return hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)), preset=preset)
+    """A planner on the map."""
+    return hn.HybridPlanner(scene.topology, preset=_preset(preset))
+
+
+_preset = lru_cache(hn.load_preset)
 
 
 def faults(scene: Scene, preset: str) -> Iterator[str]:
     """What is wrong with the plans of a preset between the ends of a scene, in both directions."""
-    planner, plane = planner_of(scene, preset), scene.plane
-    one_way = hn.OneWay(sides=scene.sides)
-    # A planner looks for the cell of a point, so an end on a side is in the cell above it.
-    ends = [((int(point[0]), int(point[1])), point) for _, point in scene.ends]
-    ends = [(cell, p) for cell, p in ends if _is_free(scene.free, cell)]
-    lengths = plane.lengths(ends, ends) if ends else np.empty((0, 0))
-    for i, start in enumerate(ends):
-        for j, goal in enumerate(ends):
-            line = lengths[i, j]
-            cells = plane.cells_length(start[0], goal[0]) if preset in CELLS else line
+    planner, one_way = planner_of(scene, preset), hn.OneWay(sides=scene.sides)
+    for i, start in enumerate(scene.placed):
+        for j, goal in enumerate(scene.placed):
+            by_cells = preset in CELLS
+            best = scene.plane.cells_length(start[0], goal[0]) if by_cells else scene.lengths[i, j]
             given = [tuple(map(float, end[1][::-1])) for end in (start, goal)]
             result = planner.plan(*given, one_way=one_way)
-            for fault in _faults_of(plane, result, (start, goal), (cells, preset)):
+            for fault in _faults_of(scene.plane, result, (start, goal), (best, preset)):
                 yield f"{preset} from {start} to {goal}: {fault}"
-
-
-def _is_free(free: NDArray[np.bool_], cell: tuple[int, int]) -> bool:
-    return cell[0] < free.shape[0] and cell[1] < free.shape[1] and bool(free[cell])
 
 
 def _faults_of(
@@ -147,10 +159,11 @@ def main() -> int:
     parser.add_argument("--maps", type=int, default=20_000)
     parser.add_argument("--first", type=int, default=0, help="seed of the first map")
     parser.add_argument("--presets", nargs="+", default=PRESETS)
+    parser.add_argument("--side", type=int, default=7, help="most cells of a side of a map")
     given = parser.parse_args()
     found, began = 0, time.process_time()
     for seed in range(given.first, given.first + given.maps):
-        scene = random_scene(seed)
+        scene = random_scene(seed, side=given.side)
         for preset in given.presets if scene else ():
             for fault in faults(scene, preset):  # type: ignore[arg-type]
                 found += 1

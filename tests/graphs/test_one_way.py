@@ -23,6 +23,7 @@ from hybridnav.graphs import (
     build_lane_graph,
     check_graph,
     export_nav2,
+    judge_route_graph,
     keep_right,
     one_way_rules,
 )
@@ -95,6 +96,16 @@ def test_what_is_written_has_one_way_edges_and_is_read_so(
 
 def test_lanes_keep_the_directions(topology: hn.TopologicalMap, built: RouteGraph) -> None:
     assert ways(keep_right(topology, built, apart_m=0.6)) == ways(built)
+
+
+def test_reports_compare_with_the_shortest_legal_paths(
+    topology: hn.TopologicalMap, built: RouteGraph
+) -> None:
+    plain, legal = (judge_route_graph(built, pairs=200, topology=one) for one in (None, topology))
+    assert plain.nearest.greatest > 1
+    assert legal.nearest.greatest < 0.6
+    assert legal.best.mean < plain.best.mean
+    assert plain.pairs == legal.pairs == 200
 
 
 def test_a_graph_that_contradicts_is_found(topology: hn.TopologicalMap) -> None:

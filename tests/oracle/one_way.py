@@ -8,6 +8,7 @@ cells join two points, and cross sides on their way; so no walk ever asks whethe
 
 import math
 from fractions import Fraction
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -51,6 +52,12 @@ class OneWayPlane:
 
     def cells_length(self, start: Cell, goal: Cell) -> float:
         """Least length of moves between two cells, infinite for none."""
+        source, target = (row * self.shape[1] + col for row, col in (start, goal))
+        return float(dijkstra(self._moves, indices=source)[target])
+
+    @cached_property
+    def _moves(self) -> csr_array:
+        """The lengths of all moves, between flat cells."""
         tails, heads, lengths = [], [], []
         n = self.free.size
         for row, col in np.argwhere(self.free).tolist():
@@ -68,9 +75,7 @@ class OneWayPlane:
                         tails.append(row * self.shape[1] + col)
                         heads.append((row + r) * self.shape[1] + col + c)
                         lengths.append(math.sqrt(2))
-        graph = csr_array((lengths, (tails, heads)), shape=(n, n))
-        source, target = (row * self.shape[1] + col for row, col in (start, goal))
-        return float(dijkstra(graph, indices=source)[target])
+        return csr_array((lengths, (tails, heads)), shape=(n, n))
 
     def allows_moves(self, cells: list[Cell], *, strict: bool) -> bool:
         """Whether each cell is reached from the one before by a move that is legal; if not strict,

@@ -14,22 +14,22 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 64_860,
-    "lines": 102_780,
-    "files": 434,
-    "code outside ext": 49_930,
+    "code": 64_840,
+    "lines": 102_710,
+    "files": 436,
+    "code outside ext": 49_880,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
     "arrows, with single modules": 158,
-    "files visited by paper": 55,
-    "lines visited by paper": 14_110,
+    "files visited by paper": 56,
+    "lines visited by paper": 14_430,
     "modules of a plan and a picture": 146,
     "imports, % of the code": 8.9,
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 71_250,
+    "lines of tests": 71_230,
 }
 
 BUDGETS = {
@@ -45,13 +45,13 @@ BUDGETS = {
     "harness": (9848, 9),
     "maps": (5325, 6),
     "models": (2152, 6),
-    "planning": (6868, 9),
+    "planning": (6875, 9),
     "pyramid": (4445, 9),
     "reasons": (1242, 6),
     "refine": (6117, 9),
-    "rooms": (5700, 9),
+    "rooms": (5080, 9),
     "route": (1047, 6),
-    "search": (12060, 9),
+    "search": (12386, 9),
     "topology": (716, 6),
     "viz": (5405, 6),
 }

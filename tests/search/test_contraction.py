@@ -17,7 +17,8 @@ def test_corners_that_are_all_joined_keep_their_distances(seed: int) -> None:
     first = np.concatenate([[0], is_arc.sum(axis=1).cumsum()]).astype(np.int64)
     arcs = np.stack([costs[is_arc], np.nonzero(is_arc)[1] << HEAD_SHIFT], 1)
     follow = np.full((4, 64), -1, np.int64)
-    upward, up, _, taken = contract(np.zeros(n, np.uint8), first, arcs, follow, (1, 1 << 60))
+    kinds, kept = np.zeros(n, np.uint8), np.empty(0, np.bool_)
+    upward, up, _, taken = contract(kinds, first, arcs, follow, (1, 1 << 60), kept)
     assert sorted(taken) == list(range(n))
 
     shortest = np.where(is_arc, costs, 1 << 40)

@@ -220,6 +220,9 @@ def compile_plan(preset: str) -> None:
         endpoints = grid.frame.points_of(np.array(_ENDPOINTS))
         planner = hn.HybridPlanner(topology, preset=preset)
         planner.plan(*endpoints).to_dict()
+        line = [(8.5, 0.0), (8.5, 32.0)]  # across the map: with it, and against it
+        for ends in (endpoints, endpoints[::-1]):
+            planner.plan(*ends, one_way={"lines": [line]})
         if preset == "paper":
             _ = topology.level.through_m  # chooses among arcs that join the same two places
             # Fields below the places, which this map has none of by default.

@@ -14,7 +14,8 @@ from hybridnav.maps.orientation import Orientation
 from hybridnav.refine import Sight
 from hybridnav.rooms import Rooms
 from hybridnav.rooms.find import outside_of
-from hybridnav.search.mesh import MeshPaths, MeshSearch, build_mesh, shortest_paths
+from hybridnav.search.directed import DirectedSides
+from hybridnav.search.mesh import DetourSearch, MeshPaths, MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.search import rounded_into
 
 LEAST_AREA_M2 = 1.0
@@ -142,6 +143,22 @@ class FreeSpace:
         """Return the shortest paths of many pairs of positions."""
         cells = self.cells_at(starts), self.cells_at(goals)
         return shortest_paths(self.search, cells, (starts, goals))
+
+    def lengths(
+        self, starts: FloatArray, goals: FloatArray, one_way: DirectedSides | None
+    ) -> FloatArray:
+        """Return the lengths of the shortest paths, in cells, infinite for none; by the directions
+        of some sides."""
+        found, ends = self.paths(starts, goals), list(zip(starts, goals, strict=True))
+        if one_way is None:
+            return found.length_cells
+        closed = np.empty(0, np.int64)
+        around = DetourSearch(self.search, self.free, closed, sides=one_way.sides)
+        lengths = found.length_cells.copy()
+        for k in np.flatnonzero(around.are_met_by(found)).tolist():
+            one, two = ((int(end[0]), int(end[1])) for end in ends[k])
+            lengths[k] = around.search.path((one, two), ends[k]).length_cells
+        return lengths
 
     def random_pairs(
         self, count: int, rng: np.random.Generator, is_kept: BoolArray

@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybridnav._base.typing import FloatArray
+from hybridnav.closures.one_way import directions_on
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs.attach import MANY_CANDIDATES, Network
 from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.waypoint_graph import RouteGraph
 from hybridnav.maps.checks import checked_between, checked_type
+from hybridnav.topology import TopologicalMap
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,8 @@ class Excess:
 class GraphReport:
     """Lengths of the routes on a graph between random pairs of free points with a path.
 
-    The optimum is the shortest any-angle path. Ends that see each other need no graph.
+    The optimum is the shortest any-angle path, with directions the shortest legal one. Ends that
+    see each other need no graph.
 
     Examples
     --------
@@ -56,7 +59,12 @@ class GraphReport:
 
 
 def judge_route_graph(
-    graph: RouteGraph, *, pairs: int = 1000, least_m: float = 0.0, seed: int = 1
+    graph: RouteGraph,
+    *,
+    pairs: int = 1000,
+    least_m: float = 0.0,
+    seed: int = 1,
+    topology: TopologicalMap | None = None,
 ) -> GraphReport:
     """Compare routes on a graph with shortest paths.
 
@@ -71,6 +79,8 @@ def judge_route_graph(
         Length of the shortest path in metres below which a pair does not count.
     seed
         Seed of the pairs; other than that of the graph, so that they are new to it.
+    topology
+        The map with rooms: shortest paths obey their one-way rules. None for none.
 
     Returns
     -------
@@ -95,8 +105,9 @@ def judge_route_graph(
     checked_between("pairs", pairs, 1, 1e6)
     space = FreeSpace.of(graph.grid)
     starts, goals = space.random_pairs(pairs, np.random.default_rng(seed), space.kept())
-    optimum = space.paths(starts, goals).length_cells
-    counts = optimum * graph.grid.resolution_m >= least_m
+    one_way = None if topology is None else directions_on(topology)
+    optimum = space.lengths(starts, goals, one_way)
+    counts = (optimum * graph.grid.resolution_m >= least_m) & np.isfinite(optimum)
     starts, goals, optimum = starts[counts], goals[counts], optimum[counts]
     if not len(starts):
         raise InvalidValueError(

@@ -276,8 +276,8 @@ class Small:
 def merge(segments: JudgedSegments, rules: Sequence[Rule]) -> None:
     """Merge segments by rules, one after the other, until no pair may merge by any of them.
 
-    Of all pairs that may, those merge that no better one meets at either segment; then those that
-    touch what has grown are rated again.
+    Pairs merge that no better pair meets at either segment; then those that touch what has grown
+    are rated again.
     """
     for rule in rules:
         changed = np.empty(0, dtype=np.int64)

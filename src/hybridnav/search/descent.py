@@ -19,17 +19,20 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import STRAIGHT, legal_moves
+from hybridnav._base.moves import STEPS
+from hybridnav._base.rows import unique_rows
 from hybridnav._base.threads import Pool
 from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.maps.costs.factors import UNIT_BITS
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import Patch
 from hybridnav.route.route import Corridor
-from hybridnav.search.grid_search import UNLIMITED, move_tables
+from hybridnav.search.directed import DirectedSides
+from hybridnav.search.grid_search import UNLIMITED, all_moves, limited, move_tables
 from hybridnav.search.kernels import descent as _kernels
 from hybridnav.search.kernels import fields as _field_kernels
 from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
-from hybridnav.search.kernels.grid_search import BUCKETS, forbid
+from hybridnav.search.kernels.grid_search import BUCKETS, LONG_GENERATIONS
 from hybridnav.search.lowest import Layer, Lowest, lowest_of, patched, patched_ends
 
 T = TypeVar("T")
@@ -38,6 +41,10 @@ _ROOM = 1024
 _ROOT_2 = math.sqrt(2)
 _WINDOWS = 1 << 20
 """More windows than a descent has."""
+_MOST_WINDOWS = LONG_GENERATIONS >> 2
+"""Windows after which new arrays are taken, long before their numbers are too large."""
+_KEPT = 4
+"""Number of maps with directions that are kept for queries with the same ones."""
 NEARLY = 0.85
 """Part of `step` that is enough: no level has exactly so many fields."""
 MANY_PLACES = 1000
@@ -77,7 +84,7 @@ class Descended(NamedTuple):
     corridor_cells: int
     """Cells of the last fields: those of the corridor, or of the route alone."""
     length: float
-    """Length of the path, cells; 0 without one."""
+    """Length of the path, cells; without one 0, infinite where it is proved that there is none."""
 
 
 def sizes_of(pyramid: DualGraphPyramid) -> list[int]:
@@ -333,6 +340,7 @@ class Descent:
             UNLIMITED,
         )
         self._field_of: IntArray | None = None
+        self._directed: dict[DirectedSides, tuple[LevelFields, MapCells]] = {}
         self.n_cells = int(np.count_nonzero(enterable))
         """Cells that paths may use."""
         self._moves_to_edit: Pool[ByteArray] = Pool(partial(np.copy, self._ground.moves))
@@ -373,21 +381,73 @@ class Descent:
             held = [*self.fields, *work.marks, *self._ground]
             return sum(array.nbytes for array in held if isinstance(array, np.ndarray))
 
-    def find(self, start: Cell, goal: Cell, *, closed: LongArray | None = None) -> Descended:
+    def find(
+        self,
+        start: Cell,
+        goal: Cell,
+        *,
+        closed: LongArray | None = None,
+        one_way: DirectedSides | None = None,
+    ) -> Descended:
         """Find a path between the centres of two cells; it need not be a shortest one.
 
         `start`, `goal`: cells of places that may be passed, (row, col); `closed`: int64 (n,), flat
-        cells that windows go round, if the way round is short; then no path proves nothing.
+        cells that windows go round, if the way round is short; then no path proves nothing;
+        `one_way`: sides that routes and windows cross in one direction only.
         """
+        fields, ground = (self.fields, self._ground) if one_way is None else self._on(one_way)
         if closed is None:
-            return self._descend(start, goal, self._horizon, _nothing)[0]
-        cols, limit = self._ground.cols, int(WAY_ROUND * self._horizon) * STRAIGHT
-        with self._moves_to_edit.lent() as moves:
-            touched, masks = forbid(moves, cols, closed, self._corner_cutting)
-            ground = self._ground._replace(moves=moves, limit=limit)
-            found, _ = self._descend(start, goal, self._horizon, _nothing, ground)
-            moves[touched] = masks
-        return found
+            # Along a legal route most windows are legal: those that obey expand more cells.
+            on = fields, self._ground
+            found, _ = self._descend(start, goal, self._horizon, _nothing, on)
+            if one_way is None or found.cells is None or not one_way.meets(found.cells):
+                return found
+            return self._descend(start, goal, self._horizon, _nothing, (fields, ground))[0]
+        limits = closed, one_way, self._corner_cutting
+        with limited(self._moves_to_edit, ground.cols, limits) as moves:
+            limit = int(WAY_ROUND * self._horizon) * STRAIGHT
+            ground = ground._replace(moves=moves, limit=limit)
+            return self._descend(start, goal, self._horizon, _nothing, (fields, ground))[0]
+
+    def _on(self, one_way: DirectedSides) -> tuple[LevelFields, MapCells]:
+        """Return fields and cells with directions; the last ones are kept.
+
+        A field leads to another one if a cell of it does.
+        """
+        kept = self._directed.pop(one_way, None)
+        if kept is None:
+            fields, moves = self.fields, self._ground.moves & ~one_way.moves.ravel()
+            neighbour, field_of = fields.neighbour.copy(), self.field_of.ravel()
+            shut = self._crossed(~moves & self._ground.moves, field_of)
+            legal = self._crossed(moves, field_of)
+            for _ in range(len(fields.starts) - 1):
+                key = np.array([len(fields.parent), 1])
+                for tail, head in shut[~np.isin(shut @ key, legal @ key)].tolist():
+                    arcs = slice(*fields.first[tail : tail + 2].tolist())
+                    # Nothing is gained by an arc to its own tail.
+                    neighbour[arcs][neighbour[arcs] == head] = tail
+                shut, legal = (
+                    unique_rows(above[above[:, 0] != above[:, 1]]).rows
+                    for above in (fields.parent[shut], fields.parent[legal])
+                )
+            ground = self._ground._replace(moves=moves, successors=all_moves())
+            kept = fields._replace(neighbour=neighbour), ground
+        self._directed[one_way] = kept
+        for old in list(self._directed)[:-_KEPT]:
+            self._directed.pop(old, None)
+        return kept
+
+    def _crossed(self, moves: ByteArray, field_of: IntArray) -> IntArray:
+        """Return from which of the last fields to which other one some straight moves lead, int32
+        (n, 2), each pair once."""
+        found = []
+        for k in range(0, 8, 2):
+            cells = np.flatnonzero(moves >> k & 1)
+            to = cells + STEPS[k] @ np.array([self._ground.cols, 1])
+            pairs = np.stack([field_of[cells], field_of[to]], axis=1)
+            is_out = (pairs[:, 0] != pairs[:, 1]) & (pairs >= 0).all(axis=1)
+            found.append(pairs[is_out] + np.int32(self.fields.starts[-2]))
+        return unique_rows(np.concatenate(found)).rows
 
     def corridor(
         self, start: Cell, goal: Cell, *, up: int = 0
@@ -450,17 +510,20 @@ class Descent:
         goal: Cell,
         horizon: float,
         look: Callable[[Marks, int], T],
-        ground: MapCells | None = None,
+        on: tuple[LevelFields, MapCells] | None = None,
     ) -> tuple[Descended, T | None]:
         """Return the outcome of a descent, and what `look` returns of what it wrote, by its number;
         None without a route."""
-        cols, ground = self._ground.cols, ground or self._ground
+        fields, ground = on or (self.fields, self._ground)
+        cols = ground.cols
         ends = start[0] * cols + start[1], goal[0] * cols + goal[1]
         work = self._works.take()
+        if work.number > _MOST_WINDOWS:
+            work = _Work(self.fields, len(ground.moves))
         while True:
             marks, number = work.marks, work.number + 1
             route, cells = _kernels.descend(
-                self.fields, marks, ground, number, ends, self._rings, horizon, self._named
+                fields, marks, ground, number, ends, self._rings, horizon, self._named
             )
             status, last, *effort, diagonals = marks.told.tolist()
             if status != _kernels.FULL:
@@ -473,9 +536,11 @@ class Descent:
         n = len(cells)
         places = route[::-1]
         length = n - 1 - diagonals + diagonals * _ROOT_2 if n else 0.0
-        fields, expanded, corridor = effort
+        if status == _kernels.NO_WAY and last == number:  # no route of the first level
+            length = math.inf
+        n_fields, expanded, corridor = effort
         path = cells if n else None
-        return Descended(places, path, expanded, fields, corridor, length), seen
+        return Descended(places, path, expanded, n_fields, corridor, length), seen
 
 
 def _nothing(_marks: Marks, _number: int) -> None:

@@ -133,12 +133,10 @@ class DirectedSides:
 
     def meets(self, cells: LongArray) -> bool:
         """Return whether a path of cells, int64 (n, 2), makes a forbidden move."""
-        masks = self.moves[cells[:-1, 0], cells[:-1, 1]]
-        near = np.flatnonzero(masks)
-        if not len(near):
-            return False
-        rows, cols = (cells[near + 1] - cells[near]).T
-        return bool((masks[near] >> _DIRECTION[rows + 1, cols + 1] & 1).any())
+        # Loads numba, which files and words need not.
+        from hybridnav.search.kernels.grid_search import makes_any  # noqa: PLC0415
+
+        return bool(makes_any(self.moves, cells))
 
     def bars(self, cells: LongArray, free: BoolArray) -> bool:
         """Return whether a path of cells, int64 (n, 2), cannot be driven round its corners.

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.worlds import office_world
+from hybridnav._base.kernels.moves import legal_moves
 from hybridnav.maps import CellClass
+from hybridnav.search.directed import DirectedSides
 from hybridnav.search.octile import (
     JumpPath,
     JumpPaths,
@@ -22,6 +24,9 @@ from hybridnav.search.octile import (
     build_jump_graph,
     contract_graph,
 )
+from hybridnav.search.octile.kernels.legs import ONWARD
+from hybridnav.search.octile.kernels.tables import number_cells, turning_cells
+from tests.one_way import random_scene
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.search.test_grid_search import problem_set, scenario_files
 from tests.strategies import MAX_SIDE, class_grids, drawn, examples
@@ -184,6 +189,38 @@ def test_a_graph_with_an_arc_without_its_reverse_is_not_contracted() -> None:
         first = (graph.first - (graph.first > arc)).astype(graph.first.dtype)
         halved = replace(graph, first=first, arcs=np.delete(graph.arcs, arc, axis=0))
         assert contract_graph(halved) is halved
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(class_grids())
+def test_where_nothing_has_a_direction_paths_turn_at_corner_cells(classes: Any) -> None:
+    free = np.pad(classes == CellClass.FREE, 1)
+    moves, cells = legal_moves(free, False).ravel(), np.flatnonzero(free)
+    _, corners, *_ = number_cells(free[1:-1, 1:-1])
+    turns = turning_cells(moves, free.shape[1], cells)
+    assert cells[turns].tolist() == corners.tolist()
+
+
+def test_paths_with_directions_are_shortest_and_a_missing_one_is_known() -> None:
+    n_lone, n_known = 0, 0
+    for seed in range(examples(100, 2000)):
+        scene = random_scene(seed, side=18, n_ends=6)
+        if scene is None or not len(scene.sides):
+            continue
+        sides = DirectedSides.of([("line", scene.sides)], scene.free.shape)
+        graph = build_jump_graph(scene.free, sides)
+        both = JumpSearch(graph), JumpSearch(contract_graph(graph))
+        n_lone += int(np.count_nonzero(graph.arcs[:, 1] >> 6 & ONWARD))
+        for (start, _), (goal, _) in itertools.product(scene.placed, scene.placed):
+            optimum = scene.plane.cells_length(start, goal)
+            for search in both:
+                found = search.path(start, goal)
+                assert_shortest(found, scene.free, (start, goal), optimum)
+                path = None if found.cells is None else list(map(tuple, found.cells.tolist()))
+                assert path is None or scene.plane.allows_moves(path, strict=True)
+                n_known += path is None and found.expanded == 0
+    assert n_lone > 0
+    assert n_known > 0
 
 
 def test_threads_that_share_a_search_get_the_answers_of_one() -> None:

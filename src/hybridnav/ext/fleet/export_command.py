@@ -126,7 +126,7 @@ def export(args: ExportOptions) -> None:
     judged = None
     if pairs is not None:
         with common.stage("comparing routes", seconds, "report"):
-            judged = hn.graphs.judge_route_graph(graph, pairs=pairs)
+            judged = hn.graphs.judge_route_graph(graph, pairs=pairs, topology=topology)
     figures = _figures(graph, judged) | {"graph": str(out), "map": str(args.map_file)}
     ids = _ids_line(graph) if fleet is None else []
     lines = [*_summary(out, graph, judged), *_left_out_lines(missing), *ids]
@@ -184,7 +184,8 @@ def _export_over_floors(args: ExportOptions) -> None:
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
         built = hn.graphs.build_lane_graph(topology, spacing_m=args.spacing_m)
         bare.extend(f"{topology.grid.name}: {each}" for each in targets.left_out(topology, built))
-        reports.append(hn.graphs.judge_route_graph(built, pairs=targets.LOSS_PAIRS))
+        judged = hn.graphs.judge_route_graph(built, pairs=targets.LOSS_PAIRS, topology=topology)
+        reports.append(judged)
         return built
 
     began = clock()

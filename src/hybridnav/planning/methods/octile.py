@@ -25,7 +25,7 @@ from hybridnav.search.found import (
     Query,
     QueryMany,
 )
-from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
+from hybridnav.search.octile import JumpGraph, JumpSearch, build_jump_graph, contract_graph
 
 if TYPE_CHECKING:
     from hybridnav.search.distance_table import LabelSource
@@ -36,6 +36,12 @@ CONTRACTED_FROM = 2000
 MANY_CELLS = 1 << 22
 """Least number of cells of a map for which queries do not wait: A* answers them while a thread
 builds the graph, in seconds."""
+_KEPT = 4
+"""Number of graphs with directions that are kept for queries with equal closures."""
+
+
+def _search_of(graph: JumpGraph) -> JumpSearch:
+    return JumpSearch(contract_graph(graph) if graph.n_corners >= CONTRACTED_FROM else graph)
 
 
 @copies_alike
@@ -59,6 +65,7 @@ class OverJumps(Method):
         self._known = known._replace(prepared=None)
         self._whole_map = WholeMap(known, settings)
         self._search = known.prepared if isinstance(known.prepared, JumpSearch) else None
+        self._directed: dict[ClosedCells, JumpSearch] = {}
         self._building = threading.RLock()  # a progress callback may plan
         self._begun = threading.Lock()
         self._frame = known.grid.frame.for_kernels
@@ -75,9 +82,7 @@ class OverJumps(Method):
                 if self._search is None:
                     graph = build_jump_graph(self._free())
                     progress(1, 2)
-                    if graph.n_corners >= CONTRACTED_FROM:
-                        graph = contract_graph(graph)
-                    self._search = JumpSearch(graph)
+                    self._search = _search_of(graph)
                     # Without the search of the first answers, 5 bytes a cell.
                     self._whole_map = WholeMap(self._known, self._settings)
                     progress(2, 2)
@@ -101,21 +106,44 @@ class OverJumps(Method):
             return self._whole_map.find(query)
         began = clock()
         seconds = {}
-        if self._search is None:
-            if self._grid.classes.size >= MANY_CELLS:
+        search = self._search
+        if search is None:
+            if not self._is_small:
                 behind(self._begun, self.prepare)
                 return self._whole_map.find(query)
-            self.prepare()
+            search = self.prepare()
             seconds["graph"] = clock() - began
         now = clock()
-        path = (self._search or self.prepare()).path(*query.cells)
+        path = search.path(*query.cells)
+        directed = query.closed if query.one_way is not None and self._is_small else None
+        if directed and path.cells is not None and directed.meets(path.cells, self._grid):
+            again = self._with(directed).path(*query.cells)
+            path = again._replace(expanded=path.expanded + again.expanded)
         seconds["jumps"] = clock() - now
         stats = PlanStats(path.expanded, seconds=seconds)
         if path.cells is None:
             return Found(None, stats=stats)
         length_m = path.length_cells * self._grid.resolution_m
         found = Found(path.cells, length_m, length_m, stats=stats)
-        return round_closed(found, query, self._whole_map.refiners[0])
+        return found if directed else round_closed(found, query, self._whole_map.refiners[0])
+
+    @property
+    def _is_small(self) -> bool:
+        """Whether queries wait for a graph."""
+        return self._grid.classes.size < MANY_CELLS
+
+    def _with(self, closed: ClosedCells) -> JumpSearch:
+        """Return the search of the graph with closed cells and directions; the last ones are
+        kept."""
+        search = self._directed.pop(closed, None)
+        if search is None:
+            free = self._free().copy()
+            free.ravel()[closed.flat] = False
+            search = _search_of(build_jump_graph(free, closed.one_way))
+        self._directed[closed] = search
+        for old in list(self._directed)[:-_KEPT]:
+            self._directed.pop(old, None)
+        return search
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the contracted graph, of the map with closed cells; see `Method`."""

@@ -7,6 +7,7 @@ pyramid to small fields, in which grid A* finds the path; or its places are the 
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -126,12 +127,16 @@ class MaxDistance(Method):
 
     def _in_one(self, descent: Descent, query: Query, began: float) -> Found | None:
         """Return the path that a descent finds down to the cells, None to search the whole map."""
-        places, cells, expanded, fields, corridor_cells, length = descent.find(*query.cells)
+        one_way = query.one_way
+        found = descent.find(*query.cells, one_way=one_way)
+        places, cells, expanded, fields, corridor_cells, length = found
         seconds = {"descent": clock() - began}
         stats = PlanStats(expanded, fields, 0, corridor_cells, seconds)
         if cells is None:
-            # Fields of one class that meet by sides are joined by arcs: no route, no path.
-            return None if self._topology.grid.corner_cutting else Found(None, stats=stats)
+            # Fields of one class that meet by sides are joined by arcs: no route, no path. Below
+            # the first level, a side with a direction may lie in a field.
+            is_open = self._topology.grid.corner_cutting or (one_way and length < math.inf)
+            return None if is_open else Found(None, stats=stats)
         per_cell = self._resolution_m
         return Found(
             cells,
@@ -167,11 +172,10 @@ class MaxDistance(Method):
         `cut`: the answer that meets closed cells, None where costs close cells.
         """
         closed = None if query.closed is None else query.closed.flat
-        # Windows keep costs modulo a number that is too small where there is no way back.
-        is_plain = self._is_plain and self._settings.horizon_cells > 0 and query.one_way is None
+        is_plain = self._is_plain and self._settings.horizon_cells > 0
         stats, began = PlanStats() if cut is None else cut.stats, clock()
         if is_plain:
-            down = descent.find(*query.cells, closed=closed)
+            down = descent.find(*query.cells, closed=closed, one_way=query.one_way)
             cells, expanded, n_cells = down.cells, down.expanded, down.corridor_cells
         else:
             cells, expanded, n_cells = None, 0, 0

@@ -309,8 +309,8 @@ def _packed_arcs(begin, size, pool):
 
 @guarded
 @njit(cache=True, nogil=True)
-def contract(kinds, first, arcs, follow, effort):
-    """Contract all corners of a graph, first those that leave few and short shortcuts.
+def contract(kinds, first, arcs, follow, effort, kept):
+    """Contract the corners of a graph, first those that leave few and short shortcuts.
 
     `kinds`: uint8 (n,), kinds of corners; `first`, `arcs`: the graph: offsets of the arcs of each
     corner; int64 (m, 2), the cost of each, and the result of `pack`. Each arc comes with its
@@ -319,11 +319,12 @@ def contract(kinds, first, arcs, follow, effort):
     class may continue along one of class c. If the bit is not set, the two must cost more than
     another path, by more than the rounding of costs. `effort`: most corners that a witness search
     settles; most arcs to examine before contraction is given up, as it also is for a corner with
-    more than `_MOST_ARCS` arcs. Returns int32 (n + 1,), where the arcs of each corner to those
-    contracted after it begin; int64 (u, 2), these arcs; int64 (u,), the corner that each leads
+    more than `_MOST_ARCS` arcs. `kept`: bool (n,), corners that are left, with arcs between them;
+    empty for none. Returns int32 (n + 1,), where the arcs of each corner to those contracted after
+    it begin; int64 (u, 2), these arcs; int64 (u,), the corner that each leads
     past, in the high half, and the positions among its arcs of those to the tail and to the head,
-    16 bits each, -1 for an arc of the graph; int32 (n,), the corners in the order of their removal.
-    If contraction is given up, there are no arcs.
+    16 bits each, -1 for an arc of the graph; int32 (n,), the corners in the order of their removal,
+    those that are left last. If contraction is given up, there are no arcs.
     """
     n = first.size - 1
     most_settled, most_looked = effort
@@ -335,17 +336,21 @@ def contract(kinds, first, arcs, follow, effort):
     # Keys that are not known lie below all others: every corner is rated before the first is
     # removed.
     queue = np.empty((n, 2), np.int64)
-    most = np.int64(1)
+    most, waiting = np.int64(1), 0
     for node in range(n):
-        push(queue, node, _UNKNOWN + size[node], node)
         most = max(most, size[node])
+        if kept.size == 0 or not kept[node]:
+            push(queue, waiting, _UNKNOWN + size[node], node)
+            waiting += 1
+        else:
+            taken[n - 1 - (node - waiting)] = node
 
     # A witness search queues the arcs of the corners that it settles, at most `most` for each.
     records = np.zeros((n, 3), np.int64)
     heap = np.empty((most_settled * most + 1, 2), np.int64)
     joined = np.empty(most * most, np.bool_)
     stamp = looked = mark = np.int64(0)
-    waiting = n
+    n_removed = waiting
     is_core, is_given_up = False, not have_reverses(first, arcs[:, 1] >> HEAD_SHIFT)
     while waiting > 0:
         node = pop(queue, waiting)
@@ -397,7 +402,7 @@ def contract(kinds, first, arcs, follow, effort):
             continue
 
         # The corner keeps its own arcs: they lead only to corners removed later, up the hierarchy.
-        taken[n - waiting - 1] = node
+        taken[n_removed - waiting - 1] = node
         _take_out(begin, size, pool, node)
         for arc in range(begin[node], begin[node] + size[node]):
             other = pool[arc, 1] >> HEAD_SHIFT

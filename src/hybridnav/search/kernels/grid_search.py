@@ -22,10 +22,12 @@ from hybridnav._base.kernels.moves import (
 _DIRECTION_BITS = 3
 _COST_BITS = 19
 _GENERATION_SHIFT = _DIRECTION_BITS + _COST_BITS
-_COST_MASK = (1 << _COST_BITS) - 1
-_SAME_GENERATION = 1 << _GENERATION_SHIFT
 GENERATIONS = (1 << (32 - _GENERATION_SHIFT)) - 1
 """Number of searches after which the array of records must be filled with zeros again."""
+_LONG_COST_BITS = 36
+LONG_GENERATIONS = (1 << (63 - _DIRECTION_BITS - _LONG_COST_BITS)) - 1
+"""The same of records of 64 bits, whose costs lose nothing: a cell that is far from those beside
+it, because there is no way back, is recorded right."""
 
 # Width of a bucket of the open list, 0.41 of a straight step; a quarter and an eighth of that are
 # equal within noise. A move raises f by less than 2 * DIAGONAL, 7 buckets: 8 take turns.
@@ -63,6 +65,23 @@ def forbid(moves, cols, blocked, corner_cutting):
                 gone |= 1 << (k + 3 & 7) | 1 << (k + 5 & 7)
             moves[to_row * cols + to_col] &= 255 - gone
     return touched, masks
+
+
+@njit(cache=True, nogil=True)
+def makes_any(moves, cells):
+    """Return whether a path makes one of some moves.
+
+    `moves`: uint8 (rows, cols), the moves from each cell, bit k for direction k; `cells`: int64 (n,
+    2), (row, col), each beside the one before.
+    """
+    for i in range(len(cells) - 1):
+        mask = moves[cells[i, 0], cells[i, 1]]
+        if mask:
+            row, col = cells[i + 1, 0] - cells[i, 0], cells[i + 1, 1] - cells[i, 1]
+            for k in range(8):
+                if mask >> k & 1 and ROW_STEP[k] == row and COL_STEP[k] == col:
+                    return True
+    return False
 
 
 @njit(cache=True, nogil=True)
@@ -127,12 +146,15 @@ def astar(
     in_corridor
         bool by label, whether such a cell may be stood on.
     records, waiting
-        uint32 (n_cells,), and the open list; see `_base.kernels.moves`.
+        uint32 or int64 (n_cells,), and the open list; see `_base.kernels.moves`.
     generation
-        Number of this search, below `GENERATIONS`.
+        Number of this search, below `GENERATIONS`, or `LONG_GENERATIONS`.
     """
     start, goal = endpoints
-    stamp = np.int64(generation) << _GENERATION_SHIFT
+    # Known when this is compiled: records of 64 bits take longer costs.
+    cost_bits = _COST_BITS if records.itemsize == 4 else _LONG_COST_BITS
+    cost_mask, same_generation = (1 << cost_bits) - 1, 1 << _DIRECTION_BITS + cost_bits
+    stamp = np.int64(generation) << _DIRECTION_BITS + cost_bits
     goal_row, goal_col = goal // cols, goal % cols
     count = np.zeros(BUCKETS, np.int64)
     room = waiting.size // BUCKETS
@@ -180,15 +202,13 @@ def astar(
             # The exclusive or clears the generation of this search: a record of another one stays
             # large.
             known = np.int64(records[np.uint64(to)]) ^ stamp
-            if known < _SAME_GENERATION and is_no_gain(
-                known, _DIRECTION_BITS, _COST_MASK, new_cost
-            ):
+            if known < same_generation and is_no_gain(known, _DIRECTION_BITS, cost_mask, new_cost):
                 continue
             to_row, to_col = row + row_step, col + col_step
             estimate = new_cost + octile_cost(to_row - goal_row, to_col - goal_col)
             if estimate >= bound:
                 continue
-            records[np.uint64(to)] = stamp | (new_cost & _COST_MASK) << _DIRECTION_BITS | k
+            records[np.uint64(to)] = stamp | (new_cost & cost_mask) << _DIRECTION_BITS | k
 
             # The goal never waits: it lowers the bound, which ends the search when nothing lies
             # below.
@@ -237,7 +257,7 @@ def astar(
             # outside its bucket, or is as good as the newer one.
             estimate = octile_cost(row - goal_row, col - goal_col)
             least = origin + (bucket << _BUCKET_SHIFT) - estimate
-            cost = full_cost(record, _DIRECTION_BITS, _COST_MASK, least)
+            cost = full_cost(record, _DIRECTION_BITS, cost_mask, least)
             if cost - least >> _BUCKET_SHIFT == 0 and cost + estimate < bound:
                 cell, k = waits, record & 7
                 break

@@ -357,7 +357,7 @@ def contract_corners(
     most = n_free * (_MOST_LOOKED if len(mesh.kinds) < MANY_CORNERS else _MORE_LOOKED)
     first, arcs = arcs_of(mesh, *edges)
     follow = classes_that_follow()
-    found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most))
+    found = contract(mesh.kinds, first, arcs, follow, (_SETTLED, most), np.empty(0, np.bool_))
     if len(arcs) and not len(found[1]):
         return None
     made = found[0], found[1], found[2], follow

@@ -17,20 +17,36 @@ from hybridnav.maps.geometry import centres
 from hybridnav.search.contraction import NO_ARC, contract, renumbered
 from hybridnav.search.octile.kernels import queries as kernels
 from hybridnav.search.octile.kernels.legs import (
+    BACKWARD,
     COLUMN_BITS,
     KIND_BITS,
+    ONWARD,
     CornerCells,
     arcs_of,
     components,
     legs_that_follow,
 )
 from hybridnav.search.octile.kernels.tables import look_ahead, number_cells
+from hybridnav.search.octile.sides import (
+    near_sides,
+    offsets_by,
+    strong_parts,
+    with_corners,
+    with_reverses,
+)
 from hybridnav.search.watched import octile_of, recorded
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+    from hybridnav._base.typing import (
+        AnyArray,
+        BoolArray,
+        FloatArray,
+        IntArray,
+        LongArray,
+    )
+    from hybridnav.search.directed import DirectedSides
     from hybridnav.search.watched import SearchRecord
 
 
@@ -83,7 +99,12 @@ class JumpGraph:
     """int64 (m,), the corner cell that a shortcut leads past and two of its arcs, see `contract` in
     the kernels. -1 for an arc of the graph; empty where the graph is not contracted."""
     component: IntArray
-    """int32 (n,), the connected part of the graph that each corner cell belongs to."""
+    """int32 (n,), the connected part of the graph that each corner cell belongs to; of one with
+    directions the strong part, first those of parts that are not strong."""
+    behind: NDArray[np.int16 | np.int32] | None = None
+    """As `ahead`, of the moves backwards, if they have directions; else None."""
+    reach: BoolArray | None = None
+    """bool (k, k), whether each of the first k parts can be left for each other one; or None."""
 
     @property
     def n_corners(self) -> int:
@@ -102,13 +123,15 @@ class JumpGraph:
         return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
-def build_jump_graph(free: BoolArray) -> JumpGraph:
+def build_jump_graph(free: BoolArray, one_way: DirectedSides | None = None) -> JumpGraph:
     """Build the jump-point graph of free cells.
 
     Parameters
     ----------
     free
         bool (rows, cols); cells outside are blocked.
+    one_way
+        Sides that may be crossed in one direction only; None for none.
 
     Returns
     -------
@@ -118,6 +141,11 @@ def build_jump_graph(free: BoolArray) -> JumpGraph:
 
     Notes
     -----
+    Beside sides with a direction, cells are corner cells where a turn cannot be replaced by moves
+    past them. By replacing all others, diagonal moves first, a shortest path becomes one of legs
+    with their diagonal first: these are the arcs, each from where it is legal. The last leg, to a
+    goal that is no corner cell, becomes one with its diagonal last.
+
     D. Harabor, T. Uras, P. Stuckey, S. Koenig: Regarding jump point search and subgoal graphs,
     2019. T. Uras, S. Koenig, C. Hernández: Subgoal graphs for optimal pathfinding in eight-neighbor
     grids, 2013 (arcs where no other corner cell lies between).
@@ -138,15 +166,28 @@ def build_jump_graph(free: BoolArray) -> JumpGraph:
     number, corners, kinds, index = number_cells(inside)
     distances = np.int16 if max(inside.shape) <= _SHORT else np.int32
     ahead = np.empty((int(np.count_nonzero(inside)), 8), dtype=distances)
-    look_ahead(number, width, index, ahead)
+    origin, barred, behind = (low[0] - 1, low[1] - 1), np.empty(0, np.uint8), ahead
+    if one_way is not None:
+        barred, against, *near = near_sides(inside, one_way, origin)
+        corners, kinds = with_corners(index, corners, kinds, near)
+        behind = np.empty_like(ahead)
+        look_ahead(number, width, index, behind, against)
+    look_ahead(number, width, index, ahead, barred)
     row, col = np.divmod(corners.astype(np.int64), width)
     places = (row << COLUMN_BITS | col) << KIND_BITS | kinds
     order, none = np.arange(len(corners), dtype=np.int32), np.empty(0, np.int64)
-    first, arcs = arcs_of((index, ahead, order, width), corners, places)
-    arrays = index, ahead, order, places, first, arcs, none, components(first, arcs)
+    tables = [(index, each, order, width) for each in (ahead, behind)]
+    first, arcs = arcs_of(*tables, corners, places, one_way is not None)
+    if one_way is None:
+        component, further = components(first, arcs), list[Any]()
+    else:
+        component, reach = strong_parts(first, arcs)
+        first, arcs = with_reverses(first, arcs)
+        further = [behind, reach]
+    arrays = index, ahead, order, places, first, arcs, none, component, *further
     for array in arrays:
         array.flags.writeable = False
-    return JumpGraph((low[0] - 1, low[1] - 1), (height, width), *arrays)
+    return JumpGraph(origin, (height, width), *arrays)
 
 
 def contract_graph(graph: JumpGraph) -> JumpGraph:
@@ -179,9 +220,20 @@ def contract_graph(graph: JumpGraph) -> JumpGraph:
     """
     kinds = (graph.places & (1 << KIND_BITS) - 1).astype(np.uint8)
     effort = _SETTLED, _MOST_LOOKED * len(graph.ahead)
-    *found, taken = contract(kinds, graph.first, graph.arcs, legs_that_follow(), effort)
-    if len(graph.arcs) and not len(found[1]):
+    n, tails = graph.n_corners, np.repeat(np.arange(graph.n_corners), np.diff(graph.first))
+    # Corner cells with arcs in one direction alone are left: between the others, and to them, arcs
+    # lead both ways.
+    is_lone = graph.arcs[:, 1] >> 6 & (ONWARD | BACKWARD) > 0
+    lone, kept = graph.arcs[is_lone], np.isin(np.arange(n), tails[is_lone])
+    kept = kept if len(lone) else kept[:0]
+    first, arcs = offsets_by(tails[~is_lone], n), graph.arcs[~is_lone]
+    *found, taken = contract(kinds, first, arcs, legs_that_follow(), effort, kept)
+    if len(arcs) and not len(found[1]):
         return graph
+    if len(lone):
+        at = found[0][tails[is_lone] + 1]
+        found[0] = found[0] + offsets_by(tails[is_lone], n)
+        found[1], found[2] = np.insert(found[1], at, lone, axis=0), np.insert(found[2], at, -1)
     top_first = taken[::-1]
     order = np.empty(len(taken), np.int32)
     order[top_first] = np.arange(len(taken), dtype=np.int32)
@@ -275,8 +327,11 @@ class JumpSearch:
     def __init__(self, graph: JumpGraph) -> None:
         self.graph = graph
         tables = graph.index, graph.ahead, graph.order, graph.shape[1]
+        back = tables if graph.behind is None else (tables[0], graph.behind, *tables[2:])
+        reach = np.empty((0, 0), np.bool_) if graph.reach is None else graph.reach
+        reach.flags.writeable = False
         corners, arcs = (graph.places, graph.component), (graph.first, graph.arcs)
-        self.arrays = CornerCells(tables, *corners, legs_that_follow(), *arcs)
+        self.arrays = CornerCells(tables, *corners, legs_that_follow(), *arcs, back, reach)
         self._works = Pool(partial(_Work, graph.n_corners, len(graph.arcs)))
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:

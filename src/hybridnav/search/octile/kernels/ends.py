@@ -30,7 +30,7 @@ def labels_of_cells(tables, places, hierarchy, cells, work):
         if is_corner(index, cell):
             found[0] = order[corner_at(index, cell)]
         else:
-            n_found = join(tables, cell, found)
+            n_found = join(tables, cell, found, False)
         seen = found[:n_found]
         to_seen, may_follow = np.empty(n_found, np.int64), np.empty(n_found, np.int64)
         for i in range(n_found):

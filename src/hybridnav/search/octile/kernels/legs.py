@@ -16,6 +16,9 @@ from hybridnav.search.octile.kernels.tables import corner_at, is_corner, number_
 
 COLUMN_BITS = 24
 KIND_BITS = 4
+ONWARD, BACKWARD = 16, 32
+"""What the class at its tail of an arc without a reverse has more, if it is a leg from the tail to
+the head, and if it is one from the head to the tail."""
 
 
 @njit(cache=True, nogil=True)
@@ -47,13 +50,15 @@ def legs_that_follow():
     degrees or less are as short as possible; so are two along sides that turn by 90 degrees if the
     cell between them is blocked. All others are longer than a path past the corner cell, whose
     moves are legal because theirs are. So an excluded pair is never on a shortest path, even where
-    there are several.
+    there are several. Of kind 0 are corner cells beside sides with a direction, where any legs
+    follow.
 
     Returns int64 (16, 16), by the blocked corners of the cell (see `number_cells`) and the class of
     the leg that ends there, walked backwards: bit c is set where a leg of class c may follow.
     """
-    table = np.zeros((16, 16), np.int64)
-    for kind in range(16):
+    table = np.full((16, 16), np.int64(-1))
+    table[1:] = 0
+    for kind in range(1, 16):
         follow = np.zeros(8, np.int64)
         for k in range(8):
             follow[k] = 1 << k | 1 << (k + 1 & 7) | 1 << (k + 7 & 7)
@@ -84,7 +89,7 @@ def row_col_kind(place):
 
 
 @njit(cache=True, nogil=True)
-def join(tables, cell, found):
+def join(tables, cell, found, is_directed):
     """Find the corner cells that are reached from a cell along a diagonal and then a side.
 
     They include every corner cell that can be the next one on a shortest path, with no other one
@@ -92,7 +97,9 @@ def join(tables, cell, found):
 
     `tables`: the index of cells (see `number_cells`), the distances ahead of them (see
     `look_ahead`), the number of each corner cell in the graph, int32 (n,), and the width of the
-    framed grid; `cell`: flat free cell; `found`: int32, room for all corner cells; filled in.
+    framed grid; `cell`: flat free cell; `found`: int32, room for all corner cells; filled in;
+    `is_directed`: whether moves have directions, so that the way over another corner cell, which a
+    diagonal and then a side lead to, may be illegal.
     Result: number of corner cells found.
     """
     index, ahead, order, width = tables
@@ -106,9 +113,14 @@ def join(tables, cell, found):
     # The four diagonals take turns, so that the processor fetches their data at the same time: `at`
     # is the position of each, -1 at its end; `limits` how far along its right and left side corner
     # cells count.
-    at, limits = np.full(8, cell), np.empty((8, 2), np.int64)
+    at, limits, by = np.full(8, cell), np.empty((8, 2), np.int64), np.full((8, 2), -1)
     for k in range(1, 8, 2):
         limits[k, 0], limits[k, 1] = limit_of(ahead[here, k - 1]), limit_of(ahead[here, k + 1 & 7])
+        # The corner cells that set these limits: only what a legal leg from there reaches is over
+        # them.
+        for i in range(2 if is_directed else 0):
+            seen = np.int64(ahead[here, k - 1 + 2 * i & 7])
+            by[k, i] = cell + seen * step_of(k - 1 + 2 * i & 7, width) if seen > 0 else -1
     n_left = 4
     while n_left > 0:
         for k in range(1, 8, 2):
@@ -127,10 +139,17 @@ def join(tables, cell, found):
             for i in range(2):
                 along = k - 1 + 2 * i & 7
                 seen = np.int64(ahead[there, along])
-                if 0 < seen < limits[k, i]:
+                # Beyond the limit another corner cell comes first, on a way that is as short.
+                if seen > 0:
                     straight = at[k] + seen * step_of(along, width)
-                    found[n_found] = order[corner_at(index, straight)]
-                    n_found += 1
+                    is_over = seen >= limits[k, i]
+                    if is_over and is_directed:
+                        is_over = by[k, i] >= 0 and is_direct(tables, by[k, i], straight)
+                    if not is_over:
+                        found[n_found] = order[corner_at(index, straight)]
+                        n_found += 1
+                if is_directed and limit_of(seen) < limits[k, i]:
+                    by[k, i] = straight if seen > 0 else -1
                 limits[k, i] = min(limits[k, i], limit_of(seen))
     return n_found
 
@@ -192,7 +211,7 @@ def _is_free(tables, at, k, distance):
 
 
 @njit(cache=True, nogil=True)
-def _joined(tables, corners):
+def _joined(tables, corners, is_directed):
     """Join every corner cell to others; return the offsets of those that each finds, and these."""
     n_corners = corners.size
     begin = np.zeros(n_corners + 1, np.int64)
@@ -200,7 +219,7 @@ def _joined(tables, corners):
     found = np.empty(n_corners, np.int32)
     n_heads = 0
     for corner in range(n_corners):
-        n_found = join(tables, np.int64(corners[corner]), found)
+        n_found = join(tables, np.int64(corners[corner]), found, is_directed)
         while n_heads + n_found > heads.size:
             heads = grow(heads)
         heads[n_heads : n_heads + n_found] = found[:n_found]
@@ -211,26 +230,34 @@ def _joined(tables, corners):
 
 @guarded
 @njit(cache=True, nogil=True)
-def arcs_of(tables, corners, places):
+def arcs_of(tables, back, corners, places, is_directed):
     """Build the arcs between corner cells.
 
-    `tables`: see `join`; `corners`: int32 (n,), flat corner cells; `places`: int64 (n,), see
-    `row_col_kind`. Returns int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2),
-    the cost of each arc, and its head and classes (see `pack`). Each arc comes with its reverse.
+    `tables`: see `join`; `back`: those of the moves backwards; `corners`: int32 (n,), flat corner
+    cells; `places`: int64 (n,), see `row_col_kind`; `is_directed`: whether moves have directions.
+    Returns int32 (n + 1,), where the arcs of each corner cell begin; int64 (m, 2), the cost of each
+    arc, and its head and classes (see `pack`). Without directions each arc comes with its reverse.
     """
-    begin, heads = _joined(tables, corners)
-    # An arc that only one endpoint finds passes another corner cell: two arcs replace it.
+    begin, heads = _joined(tables, corners, is_directed)
+    begin_back, tails = begin, heads
+    if is_directed:
+        begin_back, tails = _joined(back, corners, is_directed)
+    # An arc that only one endpoint finds passes another corner cell: two arcs replace it, if the
+    # leg is legal in the other order too.
     is_kept = np.zeros(heads.size, np.bool_)
     first = np.zeros(corners.size + 1, np.int32)
     for corner in range(corners.size):
         first[corner + 1] = first[corner]
         for at in range(begin[corner], begin[corner + 1]):
             other = heads[at]
-            for back in range(begin[other], begin[other + 1]):
-                if heads[back] == corner:
+            for k in range(begin_back[other], begin_back[other + 1]):
+                if tails[k] == corner:
                     is_kept[at] = True
-                    first[corner + 1] += 1
                     break
+            if is_directed and not is_kept[at]:
+                ends = np.int64(corners[other]), np.int64(corners[corner])
+                is_kept[at] = not is_direct(back, ends[0], ends[1])
+            first[corner + 1] += is_kept[at]
     arcs = np.empty((first[-1], 2), np.int64)
     n_arcs = 0
     for corner in range(corners.size):
@@ -291,6 +318,11 @@ class CornerCells(NamedTuple):
     """Offsets of the arcs of each corner."""
     arcs: np.ndarray
     """The corners to which they lead."""
+    back: tuple[np.ndarray, np.ndarray, np.ndarray, int]
+    """The tables of the moves backwards: the same, unless moves have directions."""
+    reach: np.ndarray
+    """Bool (k, k), whether one of the first k parts can be left for another one, if moves have
+    directions; else empty."""
 
 
 @njit(cache=True, nogil=True)
@@ -300,7 +332,7 @@ def _begin(graph, endpoints, direction, work, is_queued):
     Return the number of queued corner cells, the number that got their first cost, and their
     component, -1 where the end is joined to none.
     """
-    tables, places = graph.tables, graph.places
+    tables, places = (graph.back if direction else graph.tables), graph.places
     index, _, order, width = tables
     records, heaps, touched, found = work
     cell, aim = endpoints[direction], endpoints[1 - direction]
@@ -308,7 +340,7 @@ def _begin(graph, endpoints, direction, work, is_queued):
     if is_corner(index, cell):
         found[0] = order[corner_at(index, cell)]
     else:
-        n_found = join(tables, cell, found)
+        n_found = join(tables, cell, found, graph.reach.size > 0)
     row, col = cell // width, cell % width
     aim_row, aim_col = aim // width, aim % width
     n_touched = 0
@@ -324,6 +356,23 @@ def _begin(graph, endpoints, direction, work, is_queued):
             push(heaps[direction], i, cost + octile_cost(to_row - aim_row, to_col - aim_col), node)
     part = graph.component[found[0]] if n_found > 0 else -1
     return (n_found if is_queued else 0), n_touched, part
+
+
+@njit(cache=True, nogil=True)
+def _is_reached(graph, records, touched):
+    """Return whether a corner cell at the goal can be reached from one at the start, where moves
+    have directions."""
+    for node in touched:
+        if records[node, 0] == FAR:
+            continue
+        part = graph.component[node]
+        for other in touched:
+            to = graph.component[other]
+            if records[other, 1] < FAR and (
+                part == to or (max(part, to) < len(graph.reach) and graph.reach[part, to])
+            ):
+                return True
+    return False
 
 
 @njit(cache=True, nogil=True)
@@ -353,7 +402,7 @@ def shortest(graph, endpoints, is_contracted, work):
     )
     if is_direct(tables, endpoints[0], endpoints[1]):
         return octile_cost(rows, cols), FROM_START, 0, 0
-    if is_direct(tables, endpoints[1], endpoints[0]):
+    if is_direct(graph.back, endpoints[1], endpoints[0]):
         return octile_cost(rows, cols), FROM_GOAL, 0, 0
 
     # The corner cells at the goal get their costs even if no search starts there: by these, A* from
@@ -364,7 +413,9 @@ def shortest(graph, endpoints, is_contracted, work):
     n_touched += n_more
 
     # Corner cells in different components, or none at an end: no search would find a path.
-    if start_part != goal_part or goal_part < 0:
+    if (graph.reach.size == 0 and start_part != goal_part) or goal_part < 0:
+        return FAR, FROM_START, 0, n_touched
+    if graph.reach.size > 0 and not _is_reached(graph, records, touched[:n_touched]):
         return FAR, FROM_START, 0, n_touched
     best, meeting, expanded = FAR, np.int64(FROM_START), 0
     while True:
@@ -408,6 +459,8 @@ def shortest(graph, endpoints, is_contracted, work):
                     endpoints[direction] // width - row, endpoints[direction] % width - col
                 )
                 may_follow = follow[kind, leg]
+            may_follow &= 0xFFFF
+            may_follow |= may_follow << (BACKWARD if direction else ONWARD)
             for arc in range(first[node], first[node + 1]):
                 packed, further = arcs[arc, 1], cost + arcs[arc, 0]
                 other = packed >> 12

@@ -103,14 +103,15 @@ def _kind(number, width, cell):
 
 
 @njit(cache=True, nogil=True)
-def look_ahead(number, width, index, ahead):
+def look_ahead(number, width, index, ahead, barred):
     """Fill in the distances ahead of each free cell in the eight directions.
 
     `number`, `index`: results of `number_cells`; `width`: columns of the framed grid; `ahead`:
-    int16 or int32 (n_free, 8), filled in. Along a side: the distance to the next corner cell, or 0
-    or less, minus the free cells before a blocked one. Along a diagonal: the distance to the next
-    cell that is a corner cell or sees one along either side of that diagonal, or minus the number
-    of legal moves.
+    int16 or int32 (n_free, 8), filled in; `barred`: uint8 by framed cell, bit k for a move in
+    direction k that is illegal though its cells are free; empty for none. Along a side: the
+    distance to the next corner cell, or 0 or less, minus the free cells before a blocked one. Along
+    a diagonal: the distance to the next cell that is a corner cell or sees one along either side of
+    that diagonal, or minus the number of legal moves.
     """
     # Sides come first, because they decide where a diagonal stops.
     for flip in (1, -1):
@@ -126,7 +127,7 @@ def look_ahead(number, width, index, ahead):
                 there = number[cell + step]
 
                 # The neighbour knows the way ahead: one move more, and its sign stays.
-                if there == BLOCKED:
+                if there == BLOCKED or (barred.size > 0 and barred[cell] >> k & 1):
                     ahead[here, k] = 0
                 elif is_corner(index, cell + step):
                     ahead[here, k] = 1
@@ -150,6 +151,7 @@ def look_ahead(number, width, index, ahead):
                     there == BLOCKED
                     or number[cell + along_row] == BLOCKED
                     or number[cell + along_col] == BLOCKED
+                    or (barred.size > 0 and barred[cell] >> k & 1)
                 ):
                     ahead[here, k] = 0
                 elif (
@@ -162,3 +164,36 @@ def look_ahead(number, width, index, ahead):
                 else:
                     seen = ahead[there, k]
                     ahead[here, k] = seen + 1 if seen > 0 else seen - 1
+
+
+@njit(cache=True, nogil=True)
+def turning_cells(moves, width, cells):
+    """Return which of some cells are corner cells where moves have a direction, bool (n,).
+
+    A cell is one if a path of two moves through it has no other path to take its place: as long
+    and in the other order, if it turns by 45 degrees, else shorter.
+
+    `moves`: uint8 by framed cell, the legal moves; `width`: columns of the framed grid; `cells`:
+    int64 (n,), flat cells.
+    """
+    step = np.array([1, width + 1, width, width - 1, -1, -width - 1, -width, 1 - width])
+    found = np.zeros(len(cells), np.bool_)
+    for i in range(len(cells)):
+        for way in range(64):
+            d, k = way >> 3, way & 7
+            before, turn = cells[i] - step[d], k - d & 7
+            if not moves[before] >> d & moves[cells[i]] >> k & 1 or turn in (0, 4):
+                continue
+            hand = 1 if turn < 4 else -1
+            turns = min(turn, 8 - turn)
+            # The first move of the other path, and the second one, -1 for none.
+            one, two = k, d
+            if turns > 1:
+                one, two = d + hand * (2 if turns == 3 and d & 1 == 0 else 1) & 7, -1
+            if turns == 2 and d & 1:
+                two = one
+            is_other = moves[before] >> one & 1
+            if two >= 0:
+                is_other &= moves[before + step[one]] >> two & 1
+            found[i] |= is_other == 0
+    return found
