@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 64_840,
-    "lines": 102_710,
+    "code": 64_860,
+    "lines": 102_730,
     "files": 436,
-    "code outside ext": 49_880,
+    "code outside ext": 49_900,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -29,7 +29,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 71_230,
+    "lines of tests": 71_240,
 }
 
 BUDGETS = {
@@ -48,7 +48,7 @@ BUDGETS = {
     "planning": (6875, 9),
     "pyramid": (4445, 9),
     "reasons": (1242, 6),
-    "refine": (6117, 9),
+    "refine": (6145, 9),
     "rooms": (5080, 9),
     "route": (1047, 6),
     "search": (12386, 9),

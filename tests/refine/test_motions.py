@@ -195,6 +195,8 @@ def test_curves_are_valid_where_shapely_finds_no_state_that_is_not(reverses: boo
         for (start, goal), radius_m in zip(pairs, radii_m.tolist(), strict=False):
             valid = steer(*[*start, *goal, radius_m])
             curve = shortest_curve(tuple(start), tuple(goal), radius_m=radius_m, reverses=reverses)
+            word = curve.kinds, curve.lengths_m
+            assert check.curve_valid(start[0], start[1], start[2], *word, radius_m) is valid
             assert scenario.agrees(curve.poses(0.02 * CELL_M), valid=valid)
             n_valid += valid
             n_refused += not valid

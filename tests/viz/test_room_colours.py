@@ -105,9 +105,11 @@ def test_unexplored_cells_are_grey_with_a_room_and_without():
     ax = plot_rooms(named(labels), occupancy_grid(classes))
     grey = ImageColor.getrgb(style.UNEXPLORED)
     assert pixel(ax, (25, 5)) == ImageColor.getrgb(style.FREE)
-    known = ax.images[0].get_array().shape[1]
+    known = np.asarray(ax.images[0].get_array()).shape[1]
     assert {pixel(ax, (col, 5)) for col in range(30, known)} <= {grey}
-    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    legend = ax.get_legend()
+    assert legend is not None
+    texts = [text.get_text() for text in legend.get_texts()]
     assert "unexplored" in texts
 
 
@@ -115,7 +117,7 @@ def test_squares_stand_where_an_opening_is_listed():
     topology = topology_of(HOUSE)
     squares = next(line for line in plot_rooms(topology).lines if line.get_gid() == "openings")
     listed = [door.position for door in topology.rooms.listed_doors if door.is_opening]
-    assert squares.get_xydata().tolist() == [list(at) for at in listed]
+    assert np.asarray(squares.get_xydata()).tolist() == [list(at) for at in listed]
 
 
 def test_rooms_of_one_name_look_alike_beside_each_other():
@@ -127,5 +129,5 @@ def test_rooms_of_one_name_look_alike_beside_each_other():
         for ax, each in zip(axes, (topology, later), strict=True):
             labels = each.rooms.labels
             row, col = np.argwhere(labels.label_of == labels.names.index(name))[0]
-            seen.append(ax.images[0].get_array()[row, col].tolist())
+            seen.append(np.asarray(ax.images[0].get_array())[row, col].tolist())
         assert seen[0] == seen[1], label

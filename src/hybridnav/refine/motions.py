@@ -203,6 +203,32 @@ class MotionCheck:
         """
         return kernels.turn_on_the_spot(self._marks, self._place, self._body, x, y, yaw0, yaw1)
 
+    def curve_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
+        self,
+        x0: float,
+        y0: float,
+        yaw0: float,
+        kinds: LongArray,
+        lengths_m: FloatArray,
+        radius_m: float,
+    ) -> bool:
+        """Return whether the robot may drive a curve of arcs and straight lines.
+
+        Parameters
+        ----------
+        x0, y0, yaw0
+            Start pose, metres and radians, map frame.
+        kinds
+            int64 (n,), 1 for an arc to the left, 0 for straight on, -1 for an arc to the right.
+        lengths_m
+            float64 (n,), metres, negative backwards. No arc may exceed a full turn.
+        radius_m
+            Radius of every arc, positive.
+        """
+        return kernels.body_drives(
+            self._marks, self._place, self._body, x0, y0, yaw0, kinds, lengths_m, radius_m
+        )
+
     def dubins_valid(  # noqa: PLR0913, PLR0917 - numbers, as OMPL has them
         self, x0: float, y0: float, yaw0: float, x1: float, y1: float, yaw1: float, radius_m: float
     ) -> bool:

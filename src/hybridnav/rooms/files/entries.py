@@ -33,7 +33,7 @@ _FARTHEST = 1e9
 """Metres or pixels beyond which a coordinate counts as a mistake."""
 
 _DECIMALS = 4
-"""Of the coordinates that a fingerprint is made of."""
+"""Digits after the point of the coordinates in a fingerprint."""
 
 LIMITS = Limits(max_bytes=2**22, max_values=100_000)
 """Limits of a file of rooms; hostile files take three seconds."""

@@ -50,8 +50,7 @@ def legs_that_follow():
     degrees or less are as short as possible; so are two along sides that turn by 90 degrees if the
     cell between them is blocked. All others are longer than a path past the corner cell, whose
     moves are legal because theirs are. So an excluded pair is never on a shortest path, even where
-    there are several. Of kind 0 are corner cells beside sides with a direction, where any legs
-    follow.
+    there are several. At corner cells of kind 0, beside sides with a direction, any legs follow.
 
     Returns int64 (16, 16), by the blocked corners of the cell (see `number_cells`) and the class of
     the leg that ends there, walked backwards: bit c is set where a leg of class c may follow.
