@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybridnav._base.kept import UnknownError, _name_of
+from hybridnav._base.kept import UnknownError, name_of
 from tests.strategies import examples
 
 ROOT = Path(__file__).parents[2]
@@ -75,7 +75,7 @@ values = st.recursive(
 @given(values)
 @settings(max_examples=examples(100))
 def test_types_have_the_names_that_numba_gives_them(value: object) -> None:
-    assert _name_of(value) == str(numba.typeof(value))
+    assert name_of(value) == str(numba.typeof(value))
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_types_have_the_names_that_numba_gives_them(value: object) -> None:
 )
 def test_other_types_are_unknown(value: object) -> None:
     with pytest.raises(UnknownError):
-        _name_of(value)
+        name_of(value)
 
 
 _KERNELS = """

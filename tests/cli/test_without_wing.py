@@ -24,15 +24,13 @@ NEEDS_THE_WING = {
     "evaluate a floor's graph": [*RUNS["evaluate"], "--graph", "g.lif.json", "--floor", "1"],
 }
 WITHOUT_WING = """
-import contextlib, importlib.metadata, io, json, sys
+import contextlib, io, json, sys
+import hybridnav._base.extension as registry
 
-real = importlib.metadata.entry_points
-def entry_points(**given):
-    found = real(**given)
-    if not given.get("group", "").startswith("hybridnav."):
-        return found
-    return [one for one in found if not one.value.startswith("hybridnav.ext")]
-importlib.metadata.entry_points = entry_points
+real = registry.extensions
+def extensions(group):
+    return {name: of for name, of in real(group).items() if not of.startswith("hybridnav.ext")}
+registry.extensions = extensions
 for package in ("agent", "fleet", "graphs", "live", "page"):
     sys.modules["hybridnav.ext." + package] = None  # importing it raises ImportError
 

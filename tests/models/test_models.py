@@ -291,7 +291,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.MESH, ConvexMesh, ()),
         (structures.CORNER_GRAPH, CornerGraph, ()),
         (structures.CORNER_HIERARCHY, CornerHierarchy, ()),
-        (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape")),
+        (structures.JUMP_GRAPH, JumpGraph, ("origin", "shape", "behind", "reach")),  # directed
         (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors", "uses", "one_way")),
     ],
 )

@@ -182,7 +182,7 @@ def test_rooms_survive_both_formats(
         # Free cells of the room lie in the outline, but for those near its simplified border.
         cells = np.argwhere((label_of == index) & (classes == hn.CellClass.FREE))
         points = [Point(*point) for point in grid.frame.points_of(cells)]
-        reach = 0.05 + 1.5 * side
+        reach = 0.3 + 1.5 * side
         assert max(area.distance(point) for point in points) <= reach
 
 

@@ -45,7 +45,7 @@ BUDGETS = {
     "harness": (9848, 9),
     "maps": (5325, 6),
     "models": (2152, 6),
-    "planning": (6875, 9),
+    "planning": (6885, 9),
     "pyramid": (4445, 9),
     "reasons": (1242, 6),
     "refine": (6145, 9),

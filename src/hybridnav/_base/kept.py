@@ -100,7 +100,7 @@ def _kind_of(value: Any) -> Any:
     return (kind, *map(_kind_of, value)) if issubclass(kind, tuple) else kind
 
 
-def _name_of(value: Any) -> str:
+def name_of(value: Any) -> str:
     """Return the name of an argument's type.
 
     As numba 0.68.1 has it: `Array` in core/types/npytypes.py, tuples in core/types/containers.py.
@@ -112,7 +112,7 @@ def _name_of(value: Any) -> str:
         readonly = "" if flags.writeable else "readonly "
         return f"{readonly}array({_name_of_number(value.dtype)}, {value.ndim}d, {layout})"
     if issubclass(kind, tuple):
-        names = [_name_of(each) for each in value]
+        names = [name_of(each) for each in value]
         if value and names.count(names[0]) == len(names):
             return f"{'UniTuple' if kind is tuple else kind.__name__}({names[0]} x {len(names)})"
         return f"{'Tuple' if kind is tuple else kind.__name__}({', '.join(names)})"
@@ -184,7 +184,7 @@ _UNREADABLE = (OSError, EOFError, LookupError, AttributeError, ImportError, Valu
 
 def _load(function: Any, arguments: tuple[Any, ...]) -> Any:
     """Return what runs the code of a function that is kept for arguments."""
-    wanted = [_name_of(each) for each in arguments]
+    wanted = [name_of(each) for each in arguments]
     for path, level in _indexes(function):
         try:
             with path.open("rb") as file:

@@ -8,17 +8,19 @@ of cells is `(first row, last row + 1, first column, last column + 1)`, as slice
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.typing import BoolArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import Box
 from hybridnav.maps.frame import Frame
 from hybridnav.maps.occupancy import OccupancyGrid
+
+if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
 
 _ROUNDING_CELLS = 1e-6
 

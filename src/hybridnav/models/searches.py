@@ -1,7 +1,9 @@
 """Prepared meshes and graphs of planners as parts of a model, and back."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict
@@ -20,8 +22,10 @@ from hybridnav.models.structures import (
 from hybridnav.planning import PlannerSettings
 from hybridnav.search import mesh as meshes
 from hybridnav.search import octile as jumps
-from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
-from hybridnav.search.octile import JumpSearch
+
+if TYPE_CHECKING:  # a plan of one preset loads no other
+    from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
+    from hybridnav.search.octile import JumpSearch
 
 _FRAME = 2
 """Rows and columns of the frame of blocked cells round a jump-point graph."""

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybridnav._base.typing import FloatArray
-from hybridnav.closures.blocked import Closable
-from hybridnav.closures.one_way import OneWayLike
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.geometry import classes_at
 from hybridnav.search.found import Cell, ClosedCells, PlanStatus, Pose, Position
+
+if TYPE_CHECKING:
+    from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.one_way import OneWayLike
 
 Ends = tuple[tuple[FloatArray, FloatArray], tuple[Pose, Pose]]
 """Points of start and goal, float64 (2,), and positions, or poses where given or needed."""

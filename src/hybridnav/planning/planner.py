@@ -10,14 +10,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
-from shapely.geometry.base import BaseGeometry
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Turns
 from hybridnav._base.typing import PathLike
-from hybridnav.closures.blocked import Closable
-from hybridnav.closures.one_way import OneWayLike
 from hybridnav.errors import InvalidValueError, renamed
 from hybridnav.maps import OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_area
@@ -38,6 +35,10 @@ from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import Version, no_places
 
 if TYPE_CHECKING:
+    from shapely.geometry.base import BaseGeometry
+
+    from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.one_way import OneWayLike
     from hybridnav.planning.named import At
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.planning.profile import Profile

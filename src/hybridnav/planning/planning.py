@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import Source, copies_alike
 from hybridnav._base.typing import FloatArray
-from hybridnav.closures.blocked import Blocked, Closable
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.checks import checked_type
@@ -34,6 +33,7 @@ from hybridnav.topology import TopologicalMap
 from hybridnav.topology.map import no_places
 
 if TYPE_CHECKING:
+    from hybridnav.closures.blocked import Blocked, Closable
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
     from hybridnav.refine import CostLine

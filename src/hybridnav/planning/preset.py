@@ -8,16 +8,14 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 from types import NoneType
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import yaml
 from pydantic import ValidationError
 
 from hybridnav._base.files import printable
-from hybridnav._base.typing import PathLike
 from hybridnav._base.yaml_file import parse_value, read_yaml
 from hybridnav.errors import InvalidValueError, PresetError, PresetNotFoundError, brief
-from hybridnav.maps import OccupancyGrid
 from hybridnav.planning.settings import (
     METHODS,
     SECTIONS,
@@ -29,6 +27,10 @@ from hybridnav.planning.settings import (
     Section,
     method_of,
 )
+
+if TYPE_CHECKING:  # they load numpy, which the commands on presets need not
+    from hybridnav._base.typing import PathLike
+    from hybridnav.maps import OccupancyGrid
 
 _PACKAGE = Path(__file__).parents[1]
 _FOLDERS = (_PACKAGE / "presets", _PACKAGE.parents[1] / "planners")

@@ -10,12 +10,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import sparse
 
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.typing import BoolArray, FloatArray, LongArray
-from hybridnav.closures.blocked import Closable
-from hybridnav.closures.one_way import OneWayLike
 from hybridnav.errors import InvalidValueError, renamed
 from hybridnav.maps.costs import CostLayer
 from hybridnav.planning.endpoints import directed, read_points
@@ -23,6 +20,10 @@ from hybridnav.planning.planning import Planning
 from hybridnav.search.found import ClosedCells, Query
 
 if TYPE_CHECKING:
+    from scipy import sparse
+
+    from hybridnav.closures.blocked import Closable
+    from hybridnav.closures.one_way import OneWayLike
     from hybridnav.planning import HybridPlanner, Path, PlanBatch
     from hybridnav.planning.private_rooms import Privacy
     from hybridnav.reasons import Explanation
@@ -307,6 +308,8 @@ class _Nearest:
 
     def matrix(self) -> sparse.csr_array[Any, Any]:
         """Return the finite ones, nearest first in each row."""
+        from scipy import sparse  # noqa: PLC0415 - plans do not need it
+
         kept = np.isfinite(self._cost)
         begin = np.concatenate([[0], np.cumsum(kept.sum(axis=1))])
         return sparse.csr_array((self._cost[kept], self._to[kept], begin), shape=self._shape)

@@ -145,7 +145,8 @@ def test_a_link_that_loses_its_room_is_named(
 def test_rooms_outside_the_folder_are_not_saved(folder: Path) -> None:
     file = write_building(folder)
     outside = folder.parent / "rooms-2.yaml"
-    (folder / "more" / "rooms-2.yaml").rename(outside)
+    for name in ("rooms-2.yaml", "rooms-2.cells.png"):
+        (folder / "more" / name).rename(folder.parent / name)
     text = file.read_text("utf-8").replace("more/rooms-2.yaml", "../rooms-2.yaml")
     file.write_text(text, encoding="utf-8")
     before = outside.read_bytes()

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from benchmarks.worlds import office_world
-from hybridnav._base.kernels.moves import legal_moves
+from hybridnav._base.moves import legal_moves
 from hybridnav.maps import CellClass
 from hybridnav.search.directed import DirectedSides
 from hybridnav.search.octile import (

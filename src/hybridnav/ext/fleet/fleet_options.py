@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import hybridnav as hn
 from hybridnav._base.files import printable
-from hybridnav._base.typing import BoolArray
 from hybridnav.cli.common import UsageError, answer, complain, timings
 from hybridnav.cli.options import option
 from hybridnav.errors import MapError, brief
 
 if TYPE_CHECKING:
+    from hybridnav._base.typing import BoolArray
     from hybridnav.ext.fleet import BuildingGraph
     from hybridnav.graphs import GraphReport, RouteGraph
 

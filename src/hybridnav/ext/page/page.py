@@ -134,7 +134,7 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
     >>> model = hn.load("figure1.hnm")
     >>> topology = model.grown(model.fitted(None).pyramid, hn.find_rooms(model.grid))
     >>> save_page(Site.of_map(Session(model, topology, model.fitted(None))), "page.html")
-    4
+    2
     >>> Path("page.html").read_text()[:15]
     '<!doctype html>'
     """
