@@ -18,7 +18,7 @@ _LARGEST_ISLAND_M2 = 4.0
 """Area of furniture and pillars inside rooms; larger islands keep an outline."""
 _LEAST_NAMELESS_M2 = 1.0
 _LEAST_PART_M2 = 0.25
-"""Area below which a part of a room beside its largest one has no outline: it lies in a wall."""
+"""Area below which a part of a room beside its largest one has no outline: most lie in a wall."""
 _DECIMALS = 2
 """Decimals of coordinates: centimetres."""
 
@@ -29,7 +29,7 @@ def outlines_of(
     """Return outlines of few corners; neighbours share those of their common border.
 
     Furniture and pillars belong to the rooms round them. Free cells near an outline may lie on its
-    other side.
+    other side; parts of a room below a quarter of a square metre, beside its largest, have none.
 
     `label_of`: int32 (rows, cols), -1 for no room; every room has a free cell; `n_rooms`: number of
     rooms; `tolerance_m`: corners go whose triangle with the two beside them has less area than a
