@@ -57,7 +57,7 @@ def test_entry_points_are_those_that_importlib_finds(
         ".mine = mine.maps : read [extra]\nsvg=mine\n[hybridnav.methods]\nsvg = other\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    extension.extensions.cache_clear()
+    extension.registered.cache_clear()
     try:
         for group in ("commands", "formats", "pictures", "methods", "none"):
             points = entry_points(group=f"hybridnav.{group}")
@@ -65,7 +65,7 @@ def test_entry_points_are_those_that_importlib_finds(
             assert extension.extensions(group) == right
         assert extension.extensions("formats")[".mine"] == "mine.maps:read"
     finally:
-        extension.extensions.cache_clear()
+        extension.registered.cache_clear()
 
 
 def test_what_nothing_registers_is_said_in_one_line() -> None:

@@ -19,26 +19,32 @@ from typing import Any
 from hybridnav.errors import InvalidValueError
 
 
-@cache
 def extensions(group: str) -> dict[str, str]:
     """Return what is registered in `hybridnav.GROUP`, as `module:name` by name; it is not loaded.
 
     `importlib.metadata` takes a tenth of a plan's time for it. It is asked where the files of
     installed packages lie in no folder, as in an archive.
     """
-    found, wanted = dict[str, str](), f"[hybridnav.{group}]"
+    if (found := registered().get(f"[hybridnav.{group}]")) is not None:
+        return found
+    from importlib.metadata import entry_points  # noqa: PLC0415
+
+    return {one.name: one.value for one in entry_points(group=f"hybridnav.{group}")}
+
+
+@cache
+def registered() -> dict[str, dict[str, str]]:
+    """Return what installed packages register in the groups of this one, by their titles."""
+    found: dict[str, dict[str, str]] = {}
     for folder in map(Path, sys.path):
         for file in folder.glob("*-info/entry_points.txt") if folder.is_dir() else ():
             title = ""
             for line in file.read_text("utf-8").splitlines():
                 name, equals, of = map(str.strip, line.partition("="))
                 title = name if name.startswith("[") else title
-                if equals and title == wanted and not name.startswith("#"):
-                    found.setdefault(name, of.partition("[")[0].replace(" ", ""))
-    if not found:
-        from importlib.metadata import entry_points  # noqa: PLC0415
-
-        found = {one.name: one.value for one in entry_points(group=wanted[1:-1])}
+                if equals and title.startswith("[hybridnav.") and not name.startswith("#"):
+                    value = of.partition("[")[0].replace(" ", "")
+                    found.setdefault(title, {}).setdefault(name, value)
     return found
 
 
