@@ -4,6 +4,7 @@ import fnmatch
 import os
 import time
 import warnings
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -47,6 +48,12 @@ def maps_of(data: Path, globs: Sequence[str] = ()) -> list[str]:
     movingai = sorted((data / "movingai").rglob("*.map"))
     every = ros + [path.relative_to(data).as_posix() for path in movingai]
     return [name for name in every if not globs or matches(name, globs)]
+
+
+def office_and_maps(given: Namespace) -> dict[str, Path]:
+    """Return the files of the office and of the maps of --data that --map names, by their names."""
+    names = maps_of(given.data, given.map) if given.data is not None and given.map else []
+    return {"office": OFFICE} | {name: given.data / name for name in names}
 
 
 def matches(name: str, globs: Sequence[str]) -> bool:

@@ -26,9 +26,8 @@ import shapely
 import hybridnav as hn
 from benchmarks.common import (
     DATA,
-    OFFICE,
     SEED,
-    maps_of,
+    office_and_maps,
     option,
     prepared,
     print_head,
@@ -131,9 +130,6 @@ OPTIONS = [
 
 def main(given: Namespace) -> None:
     """Run the program."""
-    files = {"office": OFFICE}
-    if given.data is not None and given.map:
-        files |= {name: given.data / name for name in maps_of(given.data, given.map)}
     print_head("map", "closed", *COLUMNS)
-    for name, file in files.items():
+    for name, file in office_and_maps(given).items():
         measure(name, prepared(read(file), rooms=True), pairs=given.pairs, seed=given.seed)

@@ -25,10 +25,9 @@ import numpy as np
 import hybridnav as hn
 from benchmarks.common import (
     DATA,
-    OFFICE,
     SEED,
     largest_part,
-    maps_of,
+    office_and_maps,
     option,
     prepared,
     print_head,
@@ -99,11 +98,8 @@ OPTIONS = [
 
 def main(given: Namespace) -> None:
     """Run the program."""
-    files = {"office": OFFICE}
-    if given.data is not None and given.map:
-        files |= {name: given.data / name for name in maps_of(given.data, given.map)}
     print_load()
     print_head("map", "preset", *COLUMNS, "us")
-    for name, file in files.items():
+    for name, file in office_and_maps(given).items():
         for preset in given.preset or ("shortest", "octile", "paper"):
             measure(name, prepared(read(file), preset, rooms=True), given)
