@@ -35,6 +35,14 @@ import runpy
 runpy.run_module(sys.argv.pop(1), run_name="__main__", alter_sys=True)"""
 
 
+def keep_last(kept: dict[Any, Any], key: Any, value: T, most: int) -> T:
+    """Keep a value, return it, and drop all but the `most` last ones; threads may meet here."""
+    kept[key] = value
+    for old in list(kept)[:-most]:
+        kept.pop(old, None)
+    return value
+
+
 def behind(begun: threading.Lock, work: Callable[[], object]) -> None:
     """Do work in a thread that nothing waits for, the first time that it is asked for.
 

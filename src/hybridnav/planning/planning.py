@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import Source, copies_alike
+from hybridnav._base.threads import keep_last
 from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError, MapWarning
 from hybridnav.maps import OccupancyGrid
@@ -175,8 +176,7 @@ class Planning:
         known = self.closures
         with suppress(TypeError):  # a mapping has to be read; areas and doors are found as given
             if (kept := known.pop(blocked, None)) is not None:
-                known[blocked] = kept  # the last one now
-                return kept
+                return keep_last(known, blocked, kept, _KEPT)
         # Loads shapely, which most queries do not need.
         from hybridnav.closures.blocked import as_blocked  # noqa: PLC0415
 
@@ -187,12 +187,9 @@ class Planning:
         if found is None:
             found = given if isinstance(given, ClosedCells) else self._closed_by(given)
             found = found if always is None else found | always
-        known[key] = found
         with suppress(TypeError):
             known[blocked] = found
-        for old in list(known)[:-_KEPT]:
-            known.pop(old, None)
-        return found
+        return keep_last(known, key, found, _KEPT)
 
     def _closed_by(self, closure: Blocked) -> ClosedCells:
         is_solid = self.ompl is not None and self.ompl.body is not None

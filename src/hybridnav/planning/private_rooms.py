@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hybridnav._base.threads import keep_last
 from hybridnav._base.typing import BoolArray, IntArray, LongArray
 from hybridnav.closures.blocked import Blocked, Closable
 from hybridnav.maps import NO_ROOM, CellClass
@@ -270,10 +271,7 @@ class Privacy:
             return shut
         key = own, shut
         found = self._joined.pop(key, None) or own | shut
-        self._joined[key] = found
-        for old in list(self._joined)[:-_KEPT]:
-            self._joined.pop(old, None)
-        return found
+        return keep_last(self._joined, key, found, _KEPT)
 
     def _crossed(
         self,
@@ -321,10 +319,7 @@ class Privacy:
             label_of = none if here.rooms is None else here.rooms.label_of
             is_open, corners = here.open_but(shut), here.grid.corner_cutting
             found = PartGround.of(is_open, label_of, self._private[floor], corners=corners)
-        self._grounds[key] = found
-        for old in list(self._grounds)[:-_KEPT]:
-            self._grounds.pop(old, None)
-        return found
+        return keep_last(self._grounds, key, found, _KEPT)
 
     def _too_tight(self, goal: End, shut: ClosedCells | None) -> LongArray:
         """Return the cells of the goal's room from which no place to turn in is reached without

@@ -14,6 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from hybridnav._base.moves import STRAIGHT, length_in_cells
+from hybridnav._base.threads import keep_last
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps.costs import UNIT_BITS, CostLayer
 from hybridnav.pyramid.cracks import endpoints_of, middle_sides, sides_of
@@ -173,15 +174,14 @@ class DoorGraph:
         key = flat.tobytes()
         found = self._closed.get(key)
         if found is None:
-            found = self._closed[key] = DoorGraph(
+            found = DoorGraph(
                 self._rooms,
                 allow_unexplored=self._allow_unexplored,
                 closed=flat,
                 opened=self,
                 factors=self._factors,
             )
-            for oldest in list(self._closed)[:-_MOST_KEPT]:
-                self._closed.pop(oldest, None)  # another thread may have been here
+            keep_last(self._closed, key, found, _MOST_KEPT)
         return found
 
     def routes(self, start: int, goal: int) -> Iterator[DoorRoute]:

@@ -21,7 +21,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.moves import STRAIGHT, legal_moves
 from hybridnav._base.moves import STEPS
 from hybridnav._base.rows import unique_rows
-from hybridnav._base.threads import Pool
+from hybridnav._base.threads import Pool, keep_last
 from hybridnav._base.typing import BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.maps.costs.factors import UNIT_BITS
 from hybridnav.pyramid import DualGraphPyramid
@@ -398,8 +398,7 @@ class Descent:
         fields, ground = (self.fields, self._ground) if one_way is None else self._on(one_way)
         if closed is None:
             # Along a legal route most windows are legal: those that obey expand more cells.
-            on = fields, self._ground
-            found, _ = self._descend(start, goal, self._horizon, _nothing, on)
+            found, _ = self._descend(start, goal, self._horizon, _nothing, (fields, self._ground))
             if one_way is None or found.cells is None or not one_way.meets(found.cells):
                 return found
             return self._descend(start, goal, self._horizon, _nothing, (fields, ground))[0]
@@ -432,10 +431,7 @@ class Descent:
                 )
             ground = self._ground._replace(moves=moves, successors=all_moves())
             kept = fields._replace(neighbour=neighbour), ground
-        self._directed[one_way] = kept
-        for old in list(self._directed)[:-_KEPT]:
-            self._directed.pop(old, None)
-        return kept
+        return keep_last(self._directed, one_way, kept, _KEPT)
 
     def _crossed(self, moves: ByteArray, field_of: IntArray) -> IntArray:
         """Return from which of the last fields to which other one some straight moves lead, int32
@@ -534,13 +530,12 @@ class Descent:
         work.number = max(number, last)
         self._works.give(work)
         n = len(cells)
-        places = route[::-1]
         length = n - 1 - diagonals + diagonals * _ROOT_2 if n else 0.0
         if status == _kernels.NO_WAY and last == number:  # no route of the first level
             length = math.inf
         n_fields, expanded, corridor = effort
         path = cells if n else None
-        return Descended(places, path, expanded, n_fields, corridor, length), seen
+        return Descended(route[::-1], path, expanded, n_fields, corridor, length), seen
 
 
 def _nothing(_marks: Marks, _number: int) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
+from hybridnav._base.threads import keep_last
 from hybridnav._base.trig import hypots
 from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
@@ -162,10 +163,7 @@ class FloorTable:
             self.positions_m[start], self.positions_m[goal], blocked=self.closed
         )
         self._learn(start, goal, found.cost, found.lower_bound)
-        self._results[start, goal] = found
-        for old in list(self._results)[:-_KEPT]:
-            self._results.pop(old, None)
-        return found, False
+        return keep_last(self._results, (start, goal), found, _KEPT), False
 
     def fill(self) -> None:
         """Compute all costs that are not known yet, if the ends are at most 128."""

@@ -8,6 +8,7 @@ import threading
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from hybridnav._base.threads import keep_last
 from hybridnav._base.trig import dist
 from hybridnav.closures import Blocked
 from hybridnav.errors import HybridNavError, InvalidValueError
@@ -181,9 +182,7 @@ class Session:
         """
         with self._lock:
             if name not in self._layers:
-                self._layers[name] = self._drawn(name)
-                for old in list(self._layers)[:-_MOST_LAYERS]:
-                    del self._layers[old]
+                keep_last(self._layers, name, self._drawn(name), _MOST_LAYERS)
             return self._layers[name]
 
     def _drawn(self, name: str) -> MapLayer:

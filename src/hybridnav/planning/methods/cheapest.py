@@ -11,6 +11,7 @@ from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.progress import Progress, no_progress
+from hybridnav._base.threads import keep_last
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import Box
@@ -173,9 +174,7 @@ class OverLattice(Method):
             line = self._line.closing(closed.flat)
             shut = closed.flat[self._line.free.flat[closed.flat] != 0]
             lattice = self.prepare().lattice.renewed(line.free, line.factors, shut)
-            found = self._around[closed] = LatticeSearch(lattice), line
-            for old in list(self._around)[:-_KEPT]:
-                self._around.pop(old, None)
+            found = keep_last(self._around, closed, (LatticeSearch(lattice), line), _KEPT)
         return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav._base.threads import behind
+from hybridnav._base.threads import behind, keep_last
 from hybridnav._base.typing import BoolArray
 from hybridnav.planning import PlannerSettings
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
@@ -140,10 +140,7 @@ class OverJumps(Method):
             free = self._free().copy()
             free.ravel()[closed.flat] = False
             search = _search_of(build_jump_graph(free, closed.one_way))
-        self._directed[closed] = search
-        for old in list(self._directed)[:-_KEPT]:
-            self._directed.pop(old, None)
-        return search
+        return keep_last(self._directed, closed, search, _KEPT)
 
     def labels(self, closed: ClosedCells | None = None) -> LabelSource | None:
         """Return labels in the contracted graph, of the map with closed cells; see `Method`."""

@@ -14,7 +14,7 @@ import numpy as np
 from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
-from hybridnav._base.threads import Pool
+from hybridnav._base.threads import Pool, keep_last
 from hybridnav._base.trig import dist
 from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
@@ -319,9 +319,7 @@ class OverMesh(Method):
         if found is None:
             sides = None if closed.one_way is None else closed.one_way.sides
             known = search, self._free, closed.flat, self._scratch, sides
-            found = self._detours[closed] = DetourSearch(*known)
-            for old in list(self._detours)[:-_KEPT]:
-                self._detours.pop(old, None)
+            found = keep_last(self._detours, closed, DetourSearch(*known), _KEPT)
         return found
 
 
