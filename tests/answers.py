@@ -60,7 +60,6 @@ def explored(seed: int, resolution_m: float) -> str:
 
 
 def planned(topology: hn.TopologicalMap, preset: str, count: int) -> str:
-    """Return paths, costs, bounds, poses and words."""
     grid, rng = topology.grid, np.random.default_rng(1)
     cells = np.argwhere(grid.enterable())[:, None].repeat(2, axis=1)
     inside = rng.uniform(0.02, 0.98, size=(count, 2, 2))
@@ -77,7 +76,6 @@ def planned(topology: hn.TopologicalMap, preset: str, count: int) -> str:
 
 
 def answers_on(grid: hn.OccupancyGrid, count: int) -> dict[str, str]:
-    """Return what is answered on one map."""
     labels = hn.find_rooms(grid)
     pyramid = hn.DualGraphPyramid.build(grid, rooms=labels)
     topology = hn.TopologicalMap(pyramid)

@@ -115,7 +115,6 @@ def random_pairs(enterable: Any, rng: np.random.Generator, count: int) -> list[t
 
 
 def built(scene: Scene, *, corner_cutting: bool = False) -> hn.TopologicalMap:
-    """The topological map of a scene."""
     plain = scene.grid
     grid = hn.OccupancyGrid(
         plain.probability, plain.frame, corner_cutting=corner_cutting, robot_radius_m=0

@@ -26,14 +26,12 @@ class Floor:
 
     @property
     def topology(self) -> hn.TopologicalMap:
-        """The map with its rooms."""
         names = tuple(f"room {label}" for label in range(int(self.label_of.max()) + 1))
         rooms = hn.RoomLabels(names, self.label_of)
         grid = occupancy_grid(self.classes)
         return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=3.0, rooms=rooms))
 
     def room_of(self, cell: Cell) -> int:
-        """Label of the room of a cell."""
         return int(self.label_of[cell])
 
     def moves(self, *, doors: set[int] | None = None) -> "nx.Graph[Cell]":

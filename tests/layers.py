@@ -11,5 +11,4 @@ def grid_of(probability: Any, frame: hn.Frame | None = None, **settings: Any) ->
 
 
 def layer_of(factors: Any, closed: Any = None) -> hn.CostLayer:
-    """A layer of factors and closed cells."""
     return hn.CostLayer(factors, closed)

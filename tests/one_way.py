@@ -102,7 +102,6 @@ def _line(rng: np.random.Generator, rows: int, cols: int) -> list[tuple[int, ...
 
 
 def planner_of(scene: Scene, preset: str) -> hn.HybridPlanner:
-    """A planner on the map."""
     return hn.HybridPlanner(scene.topology, preset=_preset(preset))
 
 

@@ -94,7 +94,6 @@ _CLASSES: dict[str, type[Message]] = {}
 
 
 def message(name: str) -> type[Message]:
-    """The class of a type of messages."""
     if name not in _CLASSES:
         fields = {}
         for field in DEFINITIONS[name].split(", "):
@@ -165,7 +164,6 @@ class Duration(Time):
     """A duration."""
 
     def to_msg(self) -> Any:
-        """The duration as a message."""
         found: Any = message("builtin_interfaces/Duration")()
         found.sec, found.nanosec = divmod(self.nanoseconds, 10**9)
         return found
@@ -178,7 +176,6 @@ class Clock:
         self.read_ns = 1_700_000_000 * 10**9
 
     def now(self) -> Time:
-        """The time."""
         self.read_ns += 10**6
         return Time(nanoseconds=self.read_ns)
 
@@ -201,7 +198,6 @@ class Node:
         return types.SimpleNamespace(name=name, value=given)
 
     def get_clock(self) -> Clock:
-        """The clock."""
         return self._clock
 
 
@@ -213,11 +209,9 @@ class GoalHandle:
         self.status = "executing"
 
     def succeed(self) -> None:
-        """End in success."""
         self._end("succeeded")
 
     def abort(self) -> None:
-        """End in failure."""
         self._end("aborted")
 
     def _end(self, status: str) -> None:
@@ -255,7 +249,6 @@ class Buffer:
     known: ClassVar[dict[tuple[str, str], Any]] = {}
 
     def lookup_transform(self, target_frame: str, source_frame: str, time: Time) -> Any:
-        """The pose of the source in the target."""
         assert isinstance(time, Time)
         found = self.known.get((target_frame, source_frame))
         if found is None:

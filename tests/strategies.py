@@ -76,11 +76,9 @@ class Scene:
 
     @property
     def grid(self) -> OccupancyGrid:
-        """The map as an occupancy grid."""
         return occupancy_grid(self.classes, resolution_m=self.resolution_m)
 
     def pyramid(self, linkage: Linkage) -> DualGraphPyramid:
-        """The pyramid that it asks for."""
         return DualGraphPyramid.build(
             self.grid, merge_distance_m=self.merge_distance_m, linkage=linkage, seed=self.seed
         )
@@ -151,7 +149,6 @@ def _patterns(draw: st.DrawFn, shape: tuple[int, int]) -> Classes:
 
 @st.composite
 def _figure_onto(draw: st.DrawFn, classes: Classes) -> None:
-    """Paint a rectangle, the rim of one, or a wall with a door."""
     rows, cols = classes.shape
     low, high = sorted((draw(st.integers(0, rows)), draw(st.integers(0, rows))))
     left, right = sorted((draw(st.integers(0, cols)), draw(st.integers(0, cols))))

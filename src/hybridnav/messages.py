@@ -269,11 +269,6 @@ def fill_message(message: _T, values: Mapping[str, Any]) -> _T:
         Values of some of its fields: numbers, texts, lists, messages, and mappings for messages in
         it.
 
-    Returns
-    -------
-    object
-        The message.
-
     Raises
     ------
     AttributeError

@@ -66,7 +66,6 @@ class Recomputed:
         return [key for key in self.asked if key in common]
 
     def losses(self, name, optimum):
-        """Return the losses over one optimum."""
         found = []
         for key in self.shared(name):
             own, best = self.answers[name][key], self.answers[REFERENCE][key]

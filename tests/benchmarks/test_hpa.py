@@ -37,13 +37,11 @@ SIDES = st.sampled_from([2, 3, 5, 10, 64])
 
 
 def clusters(shape: tuple[int, int], side: int) -> list[tuple[slice, slice]]:
-    """The cells of each cluster."""
     rows, cols = (range(0, extent, side) for extent in shape)
     return [(slice(row, row + side), slice(col, col + side)) for row in rows for col in cols]
 
 
 def passed(method: HpaStar, answer: MethodResult) -> list[int]:
-    """Regions that the cells of an answer pass."""
     assert method.region_of is not None
     assert answer.cells is not None
     regions = method.region_of[answer.cells[:, 0], answer.cells[:, 1]]

@@ -60,7 +60,6 @@ def own_maps():
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A study of all parts."""
     made = tmp_path_factory.mktemp("study")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hybridnav.harness.run.run_local", run_here)

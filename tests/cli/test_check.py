@@ -78,7 +78,6 @@ def test_edges_are_checked_along_their_lines(cli, sound, tmp_path):
 
 
 def codes(cli, path):
-    """The exit code for each level of --fail-on, and for none."""
     levels = [cli("check", FIGURE, path, *POINT, "--fail-on", level).code for level in LEVELS]
     return [*levels, cli("check", FIGURE, path, *POINT).code]
 

@@ -45,7 +45,6 @@ def started(cache: Path, words: tuple[str, ...] = PLAN) -> subprocess.Popen[str]
 
 
 def compilers(cache: Path) -> list[int]:
-    """Processes that compile into a folder."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         try:

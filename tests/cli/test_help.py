@@ -45,7 +45,6 @@ def columns(monkeypatch):
 
 
 def sections_of(text):
-    """Return the lines of each section of a help, by its title."""
     title = ""
     sections: dict[str, list[str]] = {}
     for line in text.splitlines():
@@ -78,7 +77,6 @@ def test_the_summary_of_a_command_is_that_of_its_docstring_though_it_is_not_load
 
 
 def app_command(name: str) -> Any:
-    """A command as Typer makes it."""
     group: Any = typer.main.get_command(app)
     return group.get_command(None, name)
 

@@ -88,7 +88,6 @@ class Case:
         return self.radius_cells * self.frame.resolution_m
 
     def closed(self) -> Any:
-        """What is tested."""
         topology = empty_map(self.frame, self.shape, self.radius_cells)
         try:
             return mask_of(Blocked(polygons=[self.area]), topology)

@@ -157,7 +157,6 @@ def graph() -> hn.graphs.RouteGraph:
 
 
 def walk(graph: hn.graphs.RouteGraph, rng: np.random.Generator, steps: int) -> list[int]:
-    """A walk along edges."""
     nodes = [int(rng.integers(graph.n_nodes))]
     for _ in range(steps):
         heads = graph.edges[graph.edges[:, 0] == nodes[-1], 1]

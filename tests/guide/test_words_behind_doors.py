@@ -130,7 +130,6 @@ def verdicts(
 
 
 def found_rooms(path: FilePath) -> hn.TopologicalMap:
-    """A map with the rooms that are found in it."""
     grid = hn.load_map(path, robot_radius_m=0.2)
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid)))
 

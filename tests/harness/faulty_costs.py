@@ -1,4 +1,3 @@
-# ruff: noqa: D102 - what `solve` does differently is what each class says
 """Methods that plan by costs, each with one planted fault, for the harness to catch."""
 
 import math
@@ -38,7 +37,6 @@ class Cheapest(GridAstar):
         return answer
 
     def cost_m(self, cells: Any) -> float:
-        """Cost of a path of cells."""
         assert self.layer is not None
         return self.layer.cost_of_cells(cells) * self.grid.resolution_m
 
@@ -124,7 +122,6 @@ class WithArcs(Cheapest):
         line: AnyAngleResult,  # noqa: ARG002
         claim: CostClaim,  # noqa: ARG002
     ) -> MethodResult:
-        """Return the answer with the planted fault."""
         return answer
 
 

@@ -1,4 +1,3 @@
-# ruff: noqa: D102 - what `solve` does differently is what each class says
 """Methods with planted faults, for the harness to catch; workers import them by name."""
 
 import math

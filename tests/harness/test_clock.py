@@ -67,7 +67,6 @@ class Compiles(faulty.Sound):
             compile_long()
 
     def solve(self, start, goal):
-        """Compile, and plan."""
         if self._long:
             compile_long()
         return super().solve(start, goal)

@@ -56,7 +56,6 @@ def said(fault):
 
 
 def without_arcs(topology, lost):
-    """The checks of a topological map that has lost some arcs."""
     table = topology.level.boundary_table
     kept = ~np.isin(table[1], lost)
     level = LevelOf(topology.level, (table[0][kept], table[1][kept]))

@@ -76,7 +76,6 @@ def study(folder: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def scene(settings: RunSettings) -> Any:
-    """The map, its layer, and the weighted graph of scipy."""
     grid = hn.load_map(settings.maps[0], robot_radius_m=0)
     layer = hn.CostLayer.clearance(grid, inflation_radius_m=3, scaling=0.5, multiplier=6)
     return grid, layer, weighted(move_graph(grid.enterable()), layer.factors.astype(float))

@@ -36,7 +36,6 @@ class AtAnyAngle(ByCells):
     metric = "any-angle"
 
     def find(self, query: Query) -> Found:
-        """Return the points of the cells."""
         found: Found = super().find(query)
         if not found.has_path:
             return found
@@ -115,13 +114,11 @@ class Proving:
         self.planner = hn.HybridPlanner(topology, preset="octile")
 
     def find(self, query: Query) -> Found:
-        """Plan, and prove it."""
         result = self.planner.plan(*query.points)
         cells = None if result.path is None else result.path.cells
         return Found(cells, result.cost, result.lower_bound, proof=self.proof(result))
 
     def proof(self, result: hn.PlanResult) -> dict[str, Any]:
-        """Return the proof."""
         return hn.prove(result)
 
 
@@ -129,7 +126,6 @@ class ProvingTooMuch(Proving):
     """Claims a bound that is above the cost."""
 
     def proof(self, result: hn.PlanResult) -> dict[str, Any]:
-        """Return a false proof."""
         proof = hn.prove(result)
         return {**proof, "bound": proof.get("bound", 0) * 1.01}
 

@@ -230,7 +230,7 @@ class Slow:
     def __init__(self, grid):
         del grid
 
-    def solve(self, start, goal):  # noqa: ARG002, D102
+    def solve(self, start, goal):  # noqa: ARG002
         time.sleep(QUERY_S)
         return MethodResult(None)
 

@@ -27,7 +27,6 @@ KITTI = (_FILES / "evo-1.38.1.kitti").read_text()
 
 
 def read(tmp_path, name, content, **how):
-    """The paths of a file with some content, bytes or text."""
     file = tmp_path / name
     if isinstance(content, bytes):
         file.write_bytes(content)

@@ -56,11 +56,9 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        """A text and the element it is in."""
         self.texts.append((self.open[-1] if self.open else "", data))
 
     def all(self, tag):
-        """Attributes of each element of a name."""
         return [attributes for name, attributes in self.seen if name == tag]
 
 

@@ -117,5 +117,4 @@ def test_rules_are_carried_to_a_later_map() -> None:
 
 
 def other_room(door: hn.Door, rooms: hn.RoomLabels) -> str:
-    """A room that the door does not lead into."""
     return next(name for name in rooms.names if name not in door.rooms)

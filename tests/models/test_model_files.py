@@ -46,7 +46,6 @@ def content(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
 
 
 def prepared_planners(path: Path) -> list[hn.HybridPlanner]:
-    """The planners in a file."""
     model = hn.load(path)
     return [model.planner(name) for name in PRESETS]
 

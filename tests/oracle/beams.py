@@ -8,7 +8,6 @@ _PARTS = 2**16
 
 
 def position(cells: float) -> int:
-    """Return a position in parts of a cell."""
     return math.floor(cells * _PARTS) | 1
 
 

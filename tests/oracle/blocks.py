@@ -14,7 +14,6 @@ class Block(NamedTuple):
 
     @property
     def window(self) -> tuple[slice, slice]:
-        """Its cells."""
         rows = slice(self.row, self.row + self.side)
         return rows, slice(self.col, self.col + self.side)
 
@@ -49,7 +48,6 @@ def blocks(classes: Any, merge_distance_cells: float) -> list[Block]:
 
 
 def in_pieces(classes: Any, merge_distance_cells: float, level: int) -> Any:
-    """Cells of the blocks that are not yet whole at a level, as a mask."""
     mask = np.zeros(classes.shape, dtype=bool)
     for block in blocks(classes, merge_distance_cells):
         mask[block.window] = block.whole_at > level

@@ -32,35 +32,35 @@ class LevelLike(Protocol):
     """What a level must show to be checked for its topology."""
 
     @property
-    def n_vertices(self) -> int: ...  # noqa: D102
+    def n_vertices(self) -> int: ...
     @property
-    def n_arcs(self) -> int: ...  # noqa: D102
+    def n_arcs(self) -> int: ...
     @property
-    def field_of(self) -> AnyArray: ...  # noqa: D102
+    def field_of(self) -> AnyArray: ...
     @property
-    def cells(self) -> AnyArray: ...  # noqa: D102
+    def cells(self) -> AnyArray: ...
     @property
-    def classes(self) -> AnyArray: ...  # noqa: D102
+    def classes(self) -> AnyArray: ...
     @property
-    def arcs(self) -> AnyArray: ...  # noqa: D102
+    def arcs(self) -> AnyArray: ...
     @property
-    def base_pairs(self) -> AnyArray: ...  # noqa: D102
+    def base_pairs(self) -> AnyArray: ...
     @property
-    def sigma(self) -> AnyArray: ...  # noqa: D102
+    def sigma(self) -> AnyArray: ...
     @property
-    def protected(self) -> AnyArray: ...  # noqa: D102
+    def protected(self) -> AnyArray: ...
 
 
 class MeasuredLevel(LevelLike, Protocol):
     """A level with the attributes that planners read."""
 
     @property
-    def areas(self) -> AnyArray: ...  # noqa: D102
+    def areas(self) -> AnyArray: ...
     @property
-    def max_distance_m(self) -> AnyArray: ...  # noqa: D102
+    def max_distance_m(self) -> AnyArray: ...
     @property
-    def through_m(self) -> AnyArray: ...  # noqa: D102
-    def boundary(self, arc: int, /) -> AnyArray: ...  # noqa: D102
+    def through_m(self) -> AnyArray: ...
+    def boundary(self, arc: int, /) -> AnyArray: ...
 
 
 def check_level(level: LevelLike, base: Base) -> None:
@@ -160,7 +160,6 @@ def phi_walks(level: LevelLike) -> list[tuple[int, ...]]:
 
 
 def n_components(level: LevelLike) -> int:
-    """Components of the graph of a level."""
     size = level.n_vertices
     endpoints = (level.arcs[:, 0], level.arcs[:, 1])
     graph = sparse.csr_array((np.ones(level.n_arcs), endpoints), shape=(size, size))
@@ -187,7 +186,6 @@ def check_base(level: LevelLike, base: Base) -> None:
 
 
 def named_darts(level: LevelLike) -> list[Dart]:
-    """Name every dart of a level by its base dart."""
     darts: list[Dart] = []
     for tail, head in base_darts(level.base_pairs):
         darts += [(tail, head), (head, tail)]

@@ -94,7 +94,6 @@ def centre(grid: OccupancyGrid, cell: Cell) -> tuple[float, float]:
 
 
 def length_of_points(points: Floats) -> float:
-    """Length of a polyline."""
     return math.fsum(np.hypot(*np.diff(points, axis=0).T).tolist())
 
 

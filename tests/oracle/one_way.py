@@ -145,7 +145,6 @@ class OneWayPlane:
         )
 
     def _reached(self, point: Exact, sectors: set[Cell]) -> set[Cell]:
-        """Sectors of a point that may be reached from some of them."""
         round_it = set(_sectors(point))
         found, waiting = set(sectors), list(sectors)
         while waiting:
@@ -296,7 +295,6 @@ class _Graph:
         self._edge(np.array([tail]), np.array([head]), length)
 
     def distances(self, sources: list[int]) -> NDArray[np.float64]:
-        """Distances of all nodes from some."""
         tails, heads, lengths = (np.concatenate(part) for part in zip(*self.edges, strict=True))
         graph = csr_array((lengths, (tails, heads)), shape=(self.n, self.n))
         found: NDArray[np.float64] = dijkstra(graph, indices=sources)

@@ -84,7 +84,6 @@ class Base:
 
     @classmethod
     def of(cls, classes: AnyArray) -> "Base":
-        """Make the base of a class array."""
         vertices = classes != CellClass.OCCUPIED
         sigma = base_sigma(classes)
         faces = orbits({dart: sigma[alpha(dart)] for dart in sigma})

@@ -30,7 +30,6 @@ class ReferenceLevel:
 
     @property
     def n_vertices(self) -> int:
-        """Count of vertices."""
         return len(self.cells)
 
     @property

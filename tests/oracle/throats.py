@@ -25,7 +25,6 @@ def clearances(classes: Any, most: int) -> Any:
 
 
 def crossings(classes: Any) -> set[tuple[Square, Square]]:
-    """Pairs of squares with free cells beside each other."""
     free = {tuple(cell) for cell in np.argwhere(classes == 1).tolist()}
     found = set()
     for row, col in free:

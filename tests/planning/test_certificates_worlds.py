@@ -49,7 +49,6 @@ def test_bounds_hold_on_an_open_floor() -> None:
 
 @pytest.fixture(scope="module")
 def office() -> list[hn.HybridPlanner]:
-    """A planner for each of the choices, on the office."""
     grid = office_world().grid(robot_radius_m=0.25)
     return planners_of(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
 

@@ -46,7 +46,6 @@ class Scene(NamedTuple):
 
     @property
     def grid(self) -> hn.OccupancyGrid:
-        """The map."""
         return self.topology.grid
 
     def points(self, pair: Any) -> Any:

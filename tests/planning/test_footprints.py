@@ -63,7 +63,6 @@ class Yard:
         return list(zip(poses[::2], poses[1::2], strict=True))
 
     def query(self, start: Any, goal: Any, closed: ClosedCells | None = None) -> Query:
-        """The query between two poses."""
         cells = tuple(self.grid.frame.cell_of(*pose[:2]) for pose in (start, goal))
         return Query((cells[0], cells[1]), (start[:2], goal[:2]), closed)
 

@@ -33,7 +33,6 @@ def topology_of(grid: hn.OccupancyGrid, merge_distance_m: float = 4.0) -> hn.Top
 
 
 def both(topology: hn.TopologicalMap, *overrides: str) -> tuple[hn.HybridPlanner, hn.HybridPlanner]:
-    """A planner with the preset, and one that searches the whole grid."""
     octile, whole = (
         hn.HybridPlanner(topology, preset=hn.load_preset(name, overrides=overrides))
         for name in ("octile", "grid-astar")

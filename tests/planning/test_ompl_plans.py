@@ -42,7 +42,6 @@ def rooms() -> hn.TopologicalMap:
 
 @pytest.fixture(scope="module")
 def planner_of(office: hn.TopologicalMap) -> Iterator[Any]:
-    """Planners by preset and settings, each made once."""
     made: dict[Any, hn.HybridPlanner] = {}
 
     def make(name: str, *settings: str, topology: Any = None) -> hn.HybridPlanner:

@@ -35,7 +35,6 @@ class ByCells:
         self.n_prepared, self.frame = 0, grid.frame
 
     def prepare(self) -> None:
-        """Count."""
         self.n_prepared += 1
 
     def find(self, query: Any) -> Any:
@@ -58,7 +57,6 @@ class Faulty:
         pass
 
     def find(self, _query: Any) -> Any:
-        """Answer."""
         return self.answer
 
 

@@ -45,7 +45,6 @@ class Resigned:
         pass
 
     def refine(self, *_: Any) -> Any:
-        """Return no path."""
         return None, 7
 
 

@@ -280,7 +280,6 @@ def check_route(route: hn.Route, topology: hn.TopologicalMap, enterable: Any) ->
 
 
 def check_path(path: hn.Path, grid: hn.OccupancyGrid, enterable: Any, corridor: Any) -> None:
-    """The path is legal, and the shortest one on the cells of its corridor."""
     assert_legal(path.cells, enterable, corridor)
     start, goal = map(tuple, path.cells[[0, -1]].tolist())
     best = distances(move_graph(enterable, corridor), enterable.shape, start)[goal]

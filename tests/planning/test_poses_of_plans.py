@@ -24,7 +24,6 @@ START_YAW, GOAL_YAW = 2.0, -1.57
 
 
 def planner_of(topology: hn.TopologicalMap, preset: str) -> hn.HybridPlanner:
-    """A planner by a preset, or with OMPL in a space."""
     if preset not in OMPL:
         return hn.HybridPlanner(topology, preset=preset)
     pytest.importorskip("ompl")

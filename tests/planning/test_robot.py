@@ -24,7 +24,6 @@ OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
 
 
 def arc_steps(path: hn.Path) -> Any:
-    """Which steps of a path are arcs, and which turns on the spot."""
     assert path.headings_rad is not None
     turned = np.abs(np.angle(np.exp(1j * np.diff(path.headings_rad)))) > 1e-6
     still = (np.diff(path.points, axis=0) == 0).all(axis=1)

@@ -45,7 +45,6 @@ class KnownMap:
 
     @classmethod
     def of(cls, path: Path) -> KnownMap:
-        """Load a map twice, raw and inflated, and build its topological map."""
         with warnings.catch_warnings():
             # Some maps call grey free; they are planned on all the same.
             warnings.simplefilter("ignore", hn.errors.MapWarning)

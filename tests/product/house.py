@@ -46,7 +46,6 @@ class Source:
 
 
 def read(path: Path, root: Path = SRC) -> Source:
-    """Read and count a file."""
     text = path.read_text()
     tree = ast.parse(text)
     prose: set[int] = set()
@@ -167,7 +166,6 @@ def parts() -> list[Path]:
 
 
 def lines_of(package: Path) -> int:
-    """Return the lines of a package."""
     return sum(path.read_text().count("\n") for path in package.rglob("*.py"))
 
 
@@ -189,7 +187,6 @@ def floors_of(package: Path) -> int:
 
 
 def _home(module: str, name: str) -> Path:
-    """Return the file that a name is imported from."""
     place = SRC.parent / module.replace(".", "/")
     if (place / f"{name}.py").exists():
         return place / f"{name}.py"
@@ -227,7 +224,6 @@ def _is_named(name: str, head: str) -> bool:
 
 
 def figures(target: Path) -> dict[str, float]:
-    """Return the figures of the house by name."""
     files = sources()
     names = {one.package for one in files if len(one.path.parts) > 1}
     arrows = {(one.package, to) for one in files for to in one.imports if to != one.package}

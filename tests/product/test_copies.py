@@ -97,7 +97,6 @@ def things() -> dict[str, Any]:
 
 
 def followed(grid: hn.OccupancyGrid) -> dict[str, Any]:
-    """Versions of places and rooms, and what became of them by an update."""
     places = OnlinePyramid.of(hn.DualGraphPyramid.build(grid, merge_distance_m=1.0))
     rooms = OnlineRooms.of(grid, topology().rooms.labels).with_name(1, "first")
     probability = grid.probability.copy()

@@ -15,7 +15,6 @@ ROOT = Path(hybridnav.__file__).parents[1]
 
 
 def imports() -> dict[str, set[str]]:
-    """Return the modules of the package that each of its modules imports."""
     files = {name_of(file): file for file in (ROOT / "hybridnav").rglob("*.py")}
     found: dict[str, set[str]] = {name: set() for name in files}
     for name, file in files.items():

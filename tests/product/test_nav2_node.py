@@ -303,7 +303,6 @@ def test_the_stand_in_is_as_strict_as_rosidl() -> None:
 
 
 def plain(value: Any) -> Any:
-    """A message as dictionaries and lists."""
     if isinstance(value, ros_stand_in.Message):
         return {name: plain(getattr(value, name)) for name in value.fields}
     return [plain(each) for each in value] if isinstance(value, list) else value
@@ -335,7 +334,6 @@ def true_message(store: Any, kind: str, given: Any) -> Any:
 
 
 def sent(store: Any, kind: str, given: Any) -> Any:
-    """What arrives of a message that is sent."""
     sent = store.serialize_cdr(true_message(store, kind, given), kind)
     return store.deserialize_cdr(sent, kind)
 

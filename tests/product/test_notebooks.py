@@ -69,7 +69,6 @@ def settings(notebook: Any) -> Any:
 
 
 def with_settings(notebook: Any, **values: Any) -> Any:
-    """The notebook with other settings in its cell for them."""
     cell = settings(notebook)
     cell.source += "".join(f"\n{name} = {value!r}" for name, value in values.items())
     return notebook

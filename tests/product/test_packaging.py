@@ -275,7 +275,6 @@ def _build(root, target, folder):
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """The wheel of this checkout."""
     return _build(ROOT, "wheel", tmp_path_factory.mktemp("wheel"))
 
 

@@ -18,7 +18,6 @@ def is_private(name: str) -> bool:
 
 
 def in_private(module: str) -> bool:
-    """Tell whether a module is private, or one of kernels."""
     *packages, name = module.split(".")
     return is_private(name) or "kernels" in {name, *packages[-1:]}
 

@@ -41,7 +41,6 @@ def grown(draw: st.DrawFn, max_side: int = MAX_SIDE) -> tuple[Scene, hn.DualGrap
 
 
 def above(pyramid: hn.DualGraphPyramid) -> list[Level]:
-    """The levels from the places to the apex."""
     return [pyramid[index] for index in range(pyramid.place_level, len(pyramid))]
 
 

@@ -251,7 +251,6 @@ TEXT = " ".join(map(str, GREYS.ravel().tolist())).encode()
 
 
 def saved(values, file_format="PNG"):
-    """Return the bytes of an image."""
     stream = io.BytesIO()
     Image.fromarray(values).save(stream, file_format)
     return stream.getvalue()

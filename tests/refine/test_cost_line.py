@@ -31,7 +31,6 @@ def check(field: Field, line: Any) -> Any:
 
 
 def lattice_lines(field: Field, rng: np.random.Generator, count: int) -> list[Any]:
-    """Lines over the lattice between random positions."""
     search = LatticeSearch(build_lattice(field.free, field.factors))
     cells, ends = (each.reshape(-1, 2, 2) for each in field.positions(rng, 2 * count))
     found = [

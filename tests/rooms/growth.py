@@ -107,7 +107,6 @@ class GrowingSegments:
         parent[undone], kernel_dart[undone] = undone, -1
 
     def merge(self, merged_into: IntArray, n_vertices: int) -> None:
-        """Merge the segments as their vertices do."""
         before, segments = self._segment_of, self._segments
         segment_of = np.full(n_vertices, -1, dtype=np.int64)
         segment_of[merged_into] = before

@@ -25,7 +25,6 @@ from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
 
 @st.composite
 def cut(draw):
-    """Free cells, and segments of them."""
     classes = draw(class_grids(min(MAX_SIDE, 16)))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     free = classes == CellClass.FREE

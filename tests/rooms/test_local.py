@@ -71,7 +71,6 @@ def test_transforms_compose_to_the_identity_round_every_cycle(seed: int) -> None
 
 
 def matrix(x: float, y: float, yaw: float) -> np.ndarray:
-    """The matrix of a pose."""
     return np.array(
         [[np.cos(yaw), -np.sin(yaw), x], [np.sin(yaw), np.cos(yaw), y], [0.0, 0.0, 1.0]]
     )

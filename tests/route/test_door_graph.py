@@ -15,7 +15,6 @@ def flat(cell, floor):
 
 
 def doors_of(route: DoorRoute, graph, floor):
-    """The doors of a route, by the cells at their boundaries."""
     number_of = {
         frozenset(flat(cell, floor) for cell in cells): number
         for number, cells in enumerate(floor.doors)

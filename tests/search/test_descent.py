@@ -39,7 +39,6 @@ HOW = st.builds(
 
 
 def made(scene: Any, how: DescentSettings) -> tuple[Any, Descent]:
-    """The pyramid of a scene, and its descents over free cells."""
     pyramid = scene.pyramid("radius")
     return pyramid, Descent(pyramid, scene.classes == CellClass.FREE, how)
 

@@ -215,7 +215,6 @@ def turned() -> OccupancyGrid:
 
 
 def drawn_as(ax: Axes, gid: str) -> Any:
-    """The one artist of that name."""
     (found,) = ax.findobj(lambda artist: artist.get_gid() == gid)
     return found
 

@@ -267,7 +267,6 @@ class _Kernel(_Renewed):
         return not isinstance(self._cache, _Cache) or self._cache.is_warm()
 
     def _n_missed(self) -> int:
-        """Return the number of cache misses."""
         return sum(self.stats.cache_misses.values())
 
     @cached_property

@@ -77,7 +77,6 @@ class Kernel:
         return self.dispatcher._numba_type_
 
     def _kept(self, arguments: tuple[Any, ...]) -> Any:
-        """Return what runs the code for arguments."""
         Kernel._n_calls += 1
         try:
             key = tuple(map(_kind_of, arguments))
@@ -211,7 +210,6 @@ def _load(function: Any, arguments: tuple[Any, ...]) -> Any:
 
 @cache
 def _home() -> Path:
-    """Return the folder of numba."""
     spec = find_spec("numba")
     if spec is None or not spec.submodule_search_locations:
         raise UnknownError

@@ -235,7 +235,6 @@ class Motion:
         return Spread(poses, ahead, lengths, turns)
 
     def _poses(self, step: LongArray, part: FloatArray) -> FloatArray:
-        """Return the poses at shares of some steps."""
         place = self.points[step] + part[:, None] * self._steps[step]
         last = part == 1.0
         place[last] = self.points[step[last] + 1]

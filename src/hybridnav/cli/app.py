@@ -36,12 +36,10 @@ class _Commands(TyperGroup):
     """The commands; only the called one is loaded."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all commands."""
         del ctx
         return names()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return a command, None where there is none of the name."""
         if cmd_name not in self.commands:
             home = _home(cmd_name)
             if home is not None:
@@ -76,7 +74,6 @@ class _Command(TyperCommand):
     panels: Mapping[str, tuple[str, ...]] = {}
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """List the arguments, and the options panel by panel."""
         records: dict[str, list[tuple[str, str]]] = {
             "Arguments": [],
             **{t: [] for t in self.panels},

@@ -95,7 +95,6 @@ def _change(args: ClosedOptions) -> None:
 
 
 def _check_on_map(args: ClosedOptions, items: list[OutOfOrder]) -> None:
-    """Refuse what is not on the map."""
     settings = args.settings()
     model = args.load(settings, {})
     beside = args.map_file.parent / "rooms.yaml"

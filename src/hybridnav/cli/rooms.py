@@ -192,7 +192,6 @@ def _point_of(args: RoomsOptions) -> Point | None:
 
 
 def _room_at(point: Point, labels: RoomLabels, grid: hn.OccupancyGrid) -> dict[str, Any]:
-    """Return the room of a point, and what its cell is."""
     row, col = grid.frame.cell_of(*point)
     is_inside = 0 <= row < grid.shape[0] and 0 <= col < grid.shape[1]
     cell = CellClass(int(grid.measured[row, col])).name.lower() if is_inside else "outside"
@@ -218,7 +217,6 @@ def _print_rooms(
     old: Older | None,
     seconds: dict[str, float],
 ) -> None:
-    """Print the rooms, and what became of the names of an older map."""
     if args.as_json:
         figures = _figures(rooms, areas_m2) | {"map": str(args.map_file), "seconds": seconds}
         figures |= {} if old is None else {"names": old.figures()}
@@ -254,7 +252,6 @@ class _Row(NamedTuple):
 
 
 def _rows(rooms: Rooms, areas_m2: FloatArray, doors: Iterable[Door]) -> list[_Row]:
-    """Return a row for each room, with its doors among some."""
     from hybridnav.rooms.files.measures import measures_of  # noqa: PLC0415 - loads numpy
 
     doors_of: dict[str | None, list[tuple[Door, str | None]]] = {name: [] for name in rooms.names}

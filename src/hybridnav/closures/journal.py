@@ -234,7 +234,6 @@ class Journal:
             return len(others) < len(items)
 
     def _entries(self) -> tuple[OutOfOrder, ...]:
-        """Read the file."""
         where = f"closed {printable(self.path)}"
         marked = read_marked(self.path, what="closed", error=MapError, limits=_LIMITS)
         entries: Any = marked.values.get("closed")

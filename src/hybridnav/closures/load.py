@@ -66,11 +66,6 @@ def load_blocked(
     pose
         `(x, y, yaw)` of the frame of a mask of map_server in the map frame, in metres and radians.
 
-    Returns
-    -------
-    Blocked
-        The closed areas, with `polygons`, `keepout` or `cells`.
-
     Raises
     ------
     MapNotFoundError

@@ -150,7 +150,6 @@ class OneWay:
     def _parts(
         self, grid: OccupancyGrid, topology: TopologicalMap | None
     ) -> Iterable[tuple[str, LongArray]]:
-        """Yield the name and the sides of each item."""
         if (self.doors or self.arcs) and topology is None:
             no_places()
         for number, line in enumerate(self.lines, start=1):
@@ -289,7 +288,6 @@ def _sides_of_door(topology: TopologicalMap, door: Door, room: str | None) -> Lo
 
 
 def _sides_of_arc(topology: TopologicalMap, arc: int | LevelArc, place: int) -> LongArray:
-    """Return the sides across the boundary of an arc into a place."""
     found = arc_on(topology, arc)
     level = topology.pyramid[found.level]
     ends = level.arcs[found.index].tolist()

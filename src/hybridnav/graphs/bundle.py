@@ -320,7 +320,6 @@ def without_keepout(graph: RouteGraph, specs: Mapping[str, CostSpec]) -> RouteGr
 
 
 def _services(graph: RouteGraph, lifts: Iterable[str]) -> dict[str, str]:
-    """Return the service that calls each lift."""
     found: dict[str, str] = {}
     for name in dict.fromkeys(lifts):
         # Names in ROS have 247 letters of ASCII at most: others become their codes.
@@ -383,7 +382,6 @@ def _poses(
 
 
 def _rendered(template: str, known: Mapping[str, Any]) -> bytes:
-    """Return the text of a file."""
     from jinja2 import Environment, StrictUndefined  # noqa: PLC0415 - on demand
 
     text = resources.files("hybridnav.graphs").joinpath(template).read_text(encoding="utf-8")

@@ -89,11 +89,6 @@ def check_graph(
     along_lines
         Whether the robot follows the lines of edges, as their file draws them.
 
-    Returns
-    -------
-    GraphCheck
-        The findings.
-
     Raises
     ------
     InvalidValueError

@@ -82,11 +82,6 @@ def judge_route_graph(
     topology
         The map with rooms: shortest paths obey their one-way rules. None for none.
 
-    Returns
-    -------
-    GraphReport
-        Figures of the pairs that count.
-
     Raises
     ------
     InvalidValueError

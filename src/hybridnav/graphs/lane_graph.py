@@ -190,7 +190,6 @@ def _aims(space: FreeSpace, is_kept: BoolArray, rooms: Rooms | None) -> Aims:
 def _named(
     space: FreeSpace, part_of: IntArray, points: Mapping[str, tuple[float, float]]
 ) -> dict[str, FloatArray]:
-    """Return the positions of named points."""
     named = {name: _place_of(space, part_of, name, at) for name, at in points.items()}
     if len({tuple(at) for at in named.values()}) < len(named):
         raise InvalidValueError(f"points must lie apart, got two at one place: {brief(points)}")
@@ -200,7 +199,6 @@ def _named(
 def _place_of(
     space: FreeSpace, part_of: IntArray, name: str, point: tuple[float, float]
 ) -> FloatArray:
-    """Return the position of a named point."""
     if not (isinstance(name, str) and name):
         raise InvalidValueError(f"names of points must be texts, got {brief(name)}")
     try:
@@ -326,7 +324,6 @@ def _freed(cells: LongArray, part_of: IntArray) -> LongArray:
 
 
 def _connect(sketch: Sketch, space: FreeSpace) -> None:
-    """Join parts of the graph that free space connects."""
     sketch.unify()  # else parts that meet at one place are joined in vain
     nodes = Nodes(space, sketch.positions)
     edges = [*map(tuple, sketch.edges.tolist())]
@@ -355,7 +352,6 @@ def _same(sketch: Sketch, keep: RouteGraph | WaypointGraph) -> LongArray:
 def _described(
     topology: TopologicalMap, space: FreeSpace, sketch: Sketch, named: Mapping[str, FloatArray]
 ) -> RouteGraph:
-    """Return the route graph of a sketch, with the names of its named points."""
     name_of = {tuple(at): name for name, at in named.items()}
     names = [name_of.get(tuple(at)) for at in sketch.positions.tolist()]
     degree = np.bincount(sketch.edges.ravel(), minlength=len(sketch.kinds))

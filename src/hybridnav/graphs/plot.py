@@ -47,11 +47,6 @@ def plot_graph_check(
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Examples
     --------
     >>> import networkx as nx
@@ -95,7 +90,6 @@ def plot_graph_check(
 
 
 def _opened(ax: Axes | None, width_in: float, view: View, grid: OccupancyGrid) -> Canvas:
-    """Return axes with the cells of a map."""
     canvas = Canvas.opened(ax, width_in, view)
     draw_cells(canvas, grid, grid.classes, style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED))
     return canvas
@@ -115,7 +109,6 @@ def _draw_nodes(
 
 
 def _draw_arrows(canvas: Canvas, check: GraphCheck, line: float) -> list[Entry]:
-    """Draw an arrow on each edge that leads one way only."""
     graph = check.graph
     both = set(map(tuple, graph.edges.tolist()))
     bent = graph.lines if check.along_lines else {}
@@ -197,11 +190,6 @@ def plot_route_graph(
         Title instead of the map's name and the counts; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Examples
     --------

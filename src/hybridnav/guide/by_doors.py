@@ -93,7 +93,6 @@ class Track:
         return self._measured(substring(self._line, begin, end))
 
     def _measured(self, line: BaseGeometry) -> float:
-        """Return the length, or the cost, of parts of the path."""
         if self._costs is None:
             return float(line.length)
         parts = (shapely.get_coordinates(part) for part in np.atleast_1d(shapely.get_parts(line)))

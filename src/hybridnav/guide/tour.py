@@ -138,7 +138,6 @@ class Tour:
     def _whole(
         self, parts: list[dict[str, Any]], name: str, lists: list[list[Any]]
     ) -> list[Any] | None:
-        """Return the joined lists of all parts, None if a part has none."""
         if not self.solved or any(part[name] is None for part in parts):
             return None
         return [item for part in lists for item in part]

@@ -153,7 +153,6 @@ _GAVE_UP = (PlanStatus.APPROXIMATE, PlanStatus.TIMEOUT)
 
 
 def _line(result: PlanResult) -> AnyAngleResult | None:
-    """Return the path of a solved query if it is an any-angle path."""
     is_line = result.metric in LINE_METRICS
     if not is_line or result.path is None or not result.solved:
         return None

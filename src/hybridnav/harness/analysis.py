@@ -161,11 +161,6 @@ def load_study(
         cost of paths of cells. "both" is "weighted" in a run with costs, else the optimum in each
         path's own metric.
 
-    Returns
-    -------
-    Study
-        Its outcomes in the order of the records.
-
     Raises
     ------
     InvalidValueError

@@ -52,11 +52,6 @@ def write_outputs(
     metric
         Reference of losses; see `load_study`.
 
-    Returns
-    -------
-    Study
-        The results; `faults` lists every counter-example.
-
     Examples
     --------
     >>> from pathlib import Path

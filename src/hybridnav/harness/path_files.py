@@ -222,7 +222,6 @@ def _met(points: FloatArray, grid: OccupancyGrid) -> tuple[float, float]:
 
 
 def _table(file: Path, where: str, columns: Sequence[str] | None) -> list[RecordedPath]:
-    """Read a table by the names of its columns."""
     text = file.read_text("utf-8-sig")
     first = text.partition("\n")[0]
     delimiter = max(",;\t", key=first.count)
@@ -261,7 +260,6 @@ def _parts(name: str) -> list[str]:
 
 
 def _chosen(names: list[str], where: str) -> list[int]:
-    """Return the columns of x, y and the time, found by their names."""
     found = []
     for axis in "xy":
         own = [k for k, name in enumerate(names) if _parts(name)[-1:] == [axis]]
@@ -295,7 +293,6 @@ def _named(names: list[str], columns: Sequence[str], where: str) -> list[int]:
 
 
 def _array(file: Path, where: str, columns: Sequence[str] | None) -> list[RecordedPath]:
-    """Read an array of points."""
     values = np.load(file, allow_pickle=False)
     if values.ndim != 2 or values.dtype.kind not in "iuf":  # noqa: PLR2004
         raise MapError(f"{where}: {values.dtype} of shape {values.shape}, expected points (n, 2)")
@@ -311,7 +308,6 @@ def _array(file: Path, where: str, columns: Sequence[str] | None) -> list[Record
 
 
 def _lines(file: Path, where: str, columns: Sequence[str] | None) -> list[RecordedPath]:
-    """Read the lines of GeoJSON."""
     del columns
     text = file.read_text("utf-8-sig")
     each = text.splitlines() if file.suffix.lower().endswith("jsonl") else [text]

@@ -216,11 +216,6 @@ def judge(  # noqa: PLR0913 - all but two have defaults
     limit_m
         Limit of the share of the path with less clearance, metres; None for the robot's radius.
 
-    Returns
-    -------
-    JudgedPath
-        The verdict.
-
     Raises
     ------
     InvalidValueError

@@ -119,7 +119,6 @@ class _Names:
             self._of[sha] = own
 
     def lay(self, record: Record) -> None:
-        """Name the method of a record."""
         sha, own = record["method_sha"], record.pop("label", record["method"])
         is_said = sha not in self._of or own != record.get("made_by", own)
         if record["type"] == "preparation" and is_said:
@@ -205,7 +204,6 @@ def _drop_cut_line(path: Path) -> None:
 
 
 def _runs(folder: Path) -> list[Record]:
-    """Return the settings of the runs into a folder."""
     path = folder / RUNS_FILE
     runs = []
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():

@@ -100,7 +100,6 @@ def grids_of_shapes(
 
 
 def _frame_of(resolution_m: float, bounds: Any) -> tuple[Frame, tuple[int, int]]:
-    """Return the frame of the cells, and their rows and columns."""
     try:
         x_min, y_min, x_max, y_max = map(float, bounds)
         sides = np.array([y_max - y_min, x_max - x_min])

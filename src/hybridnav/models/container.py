@@ -273,7 +273,6 @@ def _aligned(offset: int) -> int:
 
 
 def _read_head(head: bytes, where: str) -> tuple[int, int]:
-    """Return the length and checksum of the header."""
     if len(head) < _HEAD.size or not head.startswith(_MAGIC):
         raise ModelError(
             f"{where}: no model of hybridnav: expected a file that hybridnav build has written"

@@ -282,11 +282,6 @@ def load(
         As in `load_map`. If the grid of a model was made with other values, the grid is made again
         and nothing else of the model is used.
 
-    Returns
-    -------
-    Model
-        The model; its `planner` plans at once.
-
     Raises
     ------
     MapNotFoundError

@@ -139,7 +139,6 @@ def _check_mesh(filed: FiledPart, mesh: ConvexMesh) -> None:
 def _corners_of(
     fitting: dict[str, FiledPart], known: dict[str, int], n_corners: int
 ) -> tuple[tuple[LongArray, IntArray] | None, CornerGraph | CornerHierarchy | None]:
-    """Read the edges between the corners of a mesh, and the graph that is searched."""
     for structure in (CORNER_GRAPH, CORNER_EDGES, CORNER_HIERARCHY):
         if structure.kind in fitting:
             _check_same(fitting[structure.kind], "corners", n_corners)

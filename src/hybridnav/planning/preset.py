@@ -72,11 +72,6 @@ def planner_settings(method: str = "paper", **settings: Any) -> PlannerSettings:
     **settings
         Keys of its section.
 
-    Returns
-    -------
-    PlannerSettings
-        Checked, of the class of the method.
-
     Raises
     ------
     PresetError
@@ -124,11 +119,6 @@ def load_preset(source: PathLike | Preset, *, overrides: Iterable[str] = ()) -> 
     overrides
         Settings that win over the file, each `section.key=value`, the value in YAML; checked
         together.
-
-    Returns
-    -------
-    Preset
-        Named after its file.
 
     Raises
     ------

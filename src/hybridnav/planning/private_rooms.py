@@ -110,7 +110,6 @@ class _PartSearch:
         self._room_of, self._beside, self._own = room_of, beside, own
 
     def free(self, part: int) -> bool:
-        """Return whether a part is public or of an own room."""
         return self._room_of[part] is None or self._room_of[part] in self._own
 
     def _leads(self, part: int, other: int) -> bool:

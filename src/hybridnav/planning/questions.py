@@ -299,7 +299,6 @@ class _Nearest:
         self._to = np.zeros((shape[0], count), np.int64)
 
     def add(self, rows: LongArray, columns: LongArray, lengths: FloatArray) -> None:
-        """Take a block."""
         cost = np.concatenate([self._cost[rows], lengths], axis=1)
         to = np.concatenate([self._to[rows], np.tile(columns, (len(rows), 1))], axis=1)
         best = np.argsort(cost, axis=1, kind="stable")[:, : self._count]

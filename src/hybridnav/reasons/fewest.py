@@ -120,7 +120,6 @@ class _Regions:
         self.repeated = often if len(often) <= _MOST_REPEATED else _NONE
 
     def at(self, flat: int) -> int:
-        """Return the region of a cell."""
         node = int(self._labels[flat]) - 1
         if node < 0:
             node = self._n_sets + int(np.searchsorted(self._special, flat))

@@ -48,11 +48,6 @@ def prove(result: PlanResult) -> dict[str, Any]:
     result
         A result as it was planned; copies hold no map.
 
-    Returns
-    -------
-    dict
-        The proof.
-
     Raises
     ------
     PlanError

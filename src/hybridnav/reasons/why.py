@@ -370,7 +370,6 @@ def _directed(name: str) -> Closure:
 
 
 def _number_of(door: int | Door) -> int:
-    """Return the number of a door, or a number that is given."""
     return door.number if isinstance(door, Door) else door
 
 
@@ -395,11 +394,6 @@ def explain(
         As in `HybridPlanner.plan`; a room stands for its point.
     radius_m
         The robot's radius in metres, >= 0; None for the map's.
-
-    Returns
-    -------
-    Explanation
-        The reasons, also in words.
 
     Raises
     ------
@@ -433,11 +427,6 @@ def reasons_of(
         Start and goal, `(x, y)` or `(x, y, yaw)` each, metres, map frame.
     blocked, radius_m
         As in `explain`.
-
-    Returns
-    -------
-    Explanation
-        The reasons, also in words.
     """
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):

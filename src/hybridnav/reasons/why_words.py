@@ -277,7 +277,6 @@ class _Writer:
         return self.say(key, closures=self.listed(why.against), leads=verb)
 
     def opening(self, closures: Sequence[Closure]) -> str:
-        """Say which closures have to open."""
         listed, verb = self.listed(closures), self.table["is" if len(closures) == 1 else "are"]
         if len(closures) == 1:
             return self.say("open", closures=listed, is_are=verb)

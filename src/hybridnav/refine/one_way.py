@@ -89,7 +89,6 @@ def _pulled(
 
 
 def _sides_at(one_way: DirectedSides, cell: Cell) -> IntArray:
-    """Return the sides of all parts that have one at a cell or next to it."""
     apart = np.abs(one_way.sides.reshape(-1, 2, 2) - np.array(cell)).max(axis=2)
     near = np.flatnonzero((apart <= 1).any(axis=1))
     parts = [places for places in one_way.parts.values() if np.isin(near, places).any()]
@@ -189,7 +188,6 @@ def _near(one_way: DirectedSides, line: FloatArray) -> list[bool]:
 
 
 def _open(free: AnyArray, rows: Span, cols: Span) -> set[Cell]:
-    """Return the free cells in some rows and columns."""
     n_rows, n_cols = free.shape
     return {
         (row, col)

@@ -448,7 +448,6 @@ def _doors(
 def _names(
     old: RoomLabels, new: RoomLabels, room_of: Mapping[int, int]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of all new rooms, old names among them, and the names of the others."""
     numbers = [int(m[1]) for name in (*old.names, *new.names) if (m := NUMBERED.fullmatch(name))]
     first = max(numbers, default=0) + 1
     names, others = list[str](), list[str]()

@@ -413,7 +413,6 @@ def refine(
 
 
 def _compared(each: Candidate, one: Surface, other: Surface) -> Candidate:
-    """Return a candidate with its figures."""
     hits_m = seen_m = 0.0
     there = turned(one.sample, each.angle_rad) + each.shift_m
     back = turned(other.sample - each.shift_m, -each.angle_rad)

@@ -172,11 +172,6 @@ def corridor_of(
     enterable
         bool (n_places,), the places that may be entered; None for all.
 
-    Returns
-    -------
-    Corridor
-        The places, and the number of their cells.
-
     Examples
     --------
     >>> from hybridnav.route import corridor_of

@@ -260,7 +260,6 @@ class DoorGraph:
         return _Legs(leaving, cells, costs)
 
     def _outer(self, start: int, goal: int, origin: int) -> Iterator[_Links]:
-        """Return the links from the start, and those to the goal."""
         first, last = self._fields.vertices_of(np.array([start, goal])).tolist()
         leaving, entering = self._legs[first], self._legs[last]
         ones = np.ones(1, dtype=np.int64)

@@ -78,8 +78,6 @@ def distance_blocks(
 def _rows_of(
     source: LabelSource, starts: Ends, goals: Ends, columns: slice, pool: ThreadPoolExecutor
 ) -> Iterator[tuple[slice, slice, FloatArray]]:
-    """Yield the blocks of some columns."""
-
     def labels_of(part: slice) -> Labels:
         return source.goal_labels(source.placed((goals[0][part], goals[1][part])))
 

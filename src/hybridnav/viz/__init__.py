@@ -1,6 +1,7 @@
 """Pictures of maps, places, graphs and plans, and charts of methods.
 
-Drawn on matplotlib figures without pyplot or display.
+Drawn on matplotlib figures without pyplot or display. Functions return the axes that they drew on;
+`axes.figure` is the figure.
 """
 
 import lazy_loader

@@ -101,7 +101,6 @@ class Boundaries:
 
     @cached_property
     def _face_holes(self) -> dict[int, int]:
-        """The hole of each face that is not ordinary."""
         holes: dict[int, int] = {}
         loops_last = np.argsort(self.level.is_self_loop, kind="stable")
         for arc in loops_last.tolist():

@@ -149,11 +149,6 @@ def plot_losses(
     width_in
         Width of a new figure in inches; it grows when it is saved, where names are long.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError
@@ -221,11 +216,6 @@ def plot_speed(  # noqa: PLR0913 - all but two have defaults
     width_in
         Width of a new figure in inches; it grows when it is saved, where names are long.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError
@@ -280,7 +270,6 @@ def _known(name: str, values: ArrayLike) -> FloatArray:
 def _opened(
     ax: Axes | None, width_in: float, methods: Mapping[str, object], title: str | None
 ) -> tuple[Axes, Sizes]:
-    """Return the axes given or new ones, with a title, and sizes for their figure."""
     if not methods:
         raise InvalidValueError("a chart needs one method at least, got none")
     if ax is None:

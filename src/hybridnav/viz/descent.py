@@ -197,7 +197,6 @@ def _outline(canvas: Canvas, grid: OccupancyGrid, mask: BoolArray) -> None:
 def _coloured(
     grid: OccupancyGrid, kept: KeptFields, *, is_path: bool
 ) -> tuple[IntArray, ByteArray]:
-    """Return an index for each cell, and the colour of each index."""
     n = len(kept.kept)
     index = colour_vertices(kept.arcs, n)
     table = np.tile(style.rgb(style.FREE), (n + 3, 1))

@@ -169,11 +169,6 @@ def plot_kernels(  # noqa: PLR0913 - all but the first two have defaults
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     IndexError

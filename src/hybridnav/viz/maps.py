@@ -56,11 +56,6 @@ def plot_map(
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Examples
     --------
     >>> from hybridnav.viz import plot_map
@@ -113,11 +108,6 @@ def plot_places(  # noqa: PLR0913 - all but the first have defaults
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Examples
     --------
     >>> from hybridnav.viz import plot_places
@@ -149,11 +139,6 @@ def plot_level(
         Axes to draw on; by default new ones in a new figure.
     width_in
         Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Examples
     --------
@@ -354,11 +339,6 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
         Title instead of the map's name and the range of factors; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Raises
     ------

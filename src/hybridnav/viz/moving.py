@@ -208,11 +208,6 @@ def plot_proof(
     width_in
         Width of a new figure in inches.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError

@@ -178,11 +178,6 @@ def plot_dual(
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError

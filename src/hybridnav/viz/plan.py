@@ -85,11 +85,6 @@ def plot_plan(  # noqa: PLR0913 - independent parts of a picture
     width_in
         Width of a new figure in inches, 3.3 for one column of a paper; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError
@@ -316,11 +311,6 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
         Title of the picture; by default the map's name.
     width_in
         Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Raises
     ------

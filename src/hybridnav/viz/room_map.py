@@ -68,11 +68,6 @@ def plot_rooms(  # noqa: PLR0913 - all but the first have defaults
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError

@@ -77,11 +77,6 @@ def plot_tour(  # noqa: PLR0913 - all but two have defaults
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Examples
     --------
     >>> from hybridnav.viz import plot_tour
@@ -147,11 +142,6 @@ def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
         Costs and closures of the query, drawn over the cells; None for none.
     width_in
         Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Examples
     --------
@@ -254,7 +244,6 @@ def _draw_ground(
 
 
 def _drawn_doors(rooms: Rooms, passed: Sequence[Door]) -> list[Door]:
-    """Return the doors that are listed, and all that the path passes."""
     numbers = {door.number for door in (*passed, *rooms.listed_doors)}
     return [door for door in rooms.doors if door.number in numbers]
 
@@ -287,11 +276,6 @@ def plot(
         Title instead of the usual one; empty for none.
     width_in
         Width of a new figure in inches.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Raises
     ------

@@ -47,11 +47,6 @@ def plot_mesh(
     width_in
         Width of a new figure in inches; its height follows.
 
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
-
     Raises
     ------
     InvalidValueError
@@ -141,11 +136,6 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
         Title instead of the counts of the search; empty for none.
     width_in
         Width of a new figure in inches; its height follows.
-
-    Returns
-    -------
-    Axes
-        The axes drawn on; `axes.figure` is the figure.
 
     Raises
     ------

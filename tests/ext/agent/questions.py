@@ -152,7 +152,6 @@ class Judge:
         assert {(one["door"], one["to"]) for one in found["beside"]} == beside
 
     def judge_list(self) -> None:
-        """Rooms by a word of their names, sorted as people sort."""
         word = str(self.rng.choice(["WARD", "kitchen", "buro", "lab"]))
         found = self.ask("list_rooms", name=word, count=50)
         plain = [(name.lower().replace("ü", "u"), name) for name in self.floor.names]

@@ -27,11 +27,9 @@ class Scene:
 
     @property
     def grids(self) -> list[hn.OccupancyGrid]:
-        """The maps of the floors."""
         return [floor.planner.grid for floor in self.building.floors]
 
     def somewhere(self) -> Where:
-        """A floor, and a free point on it."""
         index = int(self.rng.integers(len(self.building.floors)))
         return index, free_point(self.grids[index], self.rng)
 

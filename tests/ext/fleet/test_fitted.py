@@ -119,7 +119,6 @@ def drawn_away(graph: BuildingGraph, rng: np.random.Generator) -> tuple[float, f
 
 
 def stray_lifts(matched: MatchedGraph) -> list[str]:
-    """The lifts that are found to stop elsewhere."""
     whole = check_building_graph(matched).findings
     found = [each.where for one in whole if one.kind == "stop-elsewhere" for each in one.examples]
     return [text.split(" at ")[0].removeprefix("lift ") for text in found]

@@ -73,7 +73,6 @@ def drawn(
 
 
 def found(check: BuildingGraphCheck) -> dict[str, list[str]]:
-    """What was found in the whole, and on its floors."""
     whole = {one.kind: [each.where for each in one.examples] for one in check.findings}
     for name, own in check.floors.items():
         whole |= {f"{one.kind} {name}": [str(one.count)] for one in own.findings}

@@ -122,7 +122,6 @@ class ByWords:
         return not segment_faults(self.grid_of[floor], [one, other])
 
     def route(self, start: tuple[str, Any], goal: tuple[str, Any]) -> Wanted:
-        """The route from one point of a floor to another."""
         if start[0] == goal[0] and self.sees(start[0], start[1], goal[1]):
             return Wanted(cost=math.dist(start[1], goal[1]))
         nearest: list[Node] = []

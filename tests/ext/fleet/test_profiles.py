@@ -101,7 +101,6 @@ class Oracle:
         return (1.0 if use.corridor else away) * (use.cost if self.profile.costs else 1.0)
 
     def node_of(self, floor: str, point: tuple[float, float]) -> Node:
-        """The cell of a point."""
         index = [each.name for each in self.floors].index(floor)
         row, col = self.grids[index].frame.cell_of(*point)
         return index, int(row), int(col)

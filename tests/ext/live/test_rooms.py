@@ -155,7 +155,6 @@ class Building(RuleBasedStateMachine):
             self.version = self.version.with_name(number, f"office {number}")
 
     def follow(self, classes, shift=(0, 0)):
-        """Update, and check what the update states."""
         self.corner = self.corner[0] - shift[0], self.corner[1] - shift[1]
         before, cells = self.version, self.version.number_of.copy()
         update = before.update(grid_of(classes, self.corner))

@@ -193,7 +193,6 @@ def test_the_table_forgets_places_that_are_no_more():
 
 
 def state_of(version):
-    """Return all that a version consists of."""
     state = version.state
     tiles = {
         key: [values.tobytes() for values in tile] for key, tile in state.tiles.arrays().items()

@@ -95,7 +95,6 @@ class Robot(RuleBasedStateMachine):
         self.version = version_of(classes, merge_distance_m=merge_distance_m)
 
     def follow(self, classes, *, changed, shift=(0, 0)):
-        """Update, and check what the update states."""
         self.origin = self.origin[0] - shift[1], self.origin[1] - shift[0]
         frame = Frame(origin_m=self.origin)
         grid = OccupancyGrid(occupancy_grid(classes).probability, frame, robot_radius_m=0)
@@ -108,7 +107,6 @@ class Robot(RuleBasedStateMachine):
 
     @rule(data=st.data(), kind=st.sampled_from([0, 1, 1, 2]), noisy=st.booleans())
     def paint(self, data, kind, noisy):
-        """Change a rectangle."""
         rows, cols = self.classes.shape
         low, high = sorted(data.draw(st.integers(0, rows - 1)) for _ in range(2))
         left, right = sorted(data.draw(st.integers(0, cols - 1)) for _ in range(2))

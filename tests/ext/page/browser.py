@@ -79,7 +79,6 @@ class Shown:
         self.page.check(f"input[value={name}]")
 
     def text(self, selector: str) -> str:
-        """Return the text of an element."""
         return str(self.page.locator(selector).inner_text())
 
     def wait(self, script: str) -> None:

@@ -154,7 +154,6 @@ class Answer:
 
     @property
     def value(self) -> Any:
-        """The JSON in the body."""
         return json.loads(self.body)
 
 
@@ -168,7 +167,6 @@ class Client:
 
     @property
     def address(self) -> str:
-        """The address of the page."""
         return f"http://127.0.0.1:{self.port}/{TOKEN}/"
 
     def send(

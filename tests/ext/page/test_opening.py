@@ -40,7 +40,6 @@ class _Held:
 
     @classmethod
     def building(cls, folder: Path) -> Self:
-        """Return a building of two floors."""
         file = write_building(folder)
         return cls(file, "reading 2 floors", name="building", floors=["ground", "2: upper"])
 

@@ -189,7 +189,6 @@ def index_in(place: complex, frame: hn.Frame, pose: Any) -> tuple[float, float]:
 
 
 def centre(frame: hn.Frame, row: int, col: int) -> complex:
-    """The centre of a cell."""
     turned = complex(col + 0.5, row + 0.5) * frame.resolution_m * cmath.exp(1j * frame.yaw_rad)
     return complex(*frame.origin_m) + turned
 

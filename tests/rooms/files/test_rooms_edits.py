@@ -51,7 +51,6 @@ def path(floor, tmp_path):
 
 
 def free_rooms(rooms, grid):
-    """The name of the room of each free cell."""
     names = np.array([*rooms.names, None], dtype=object)
     return names[rooms.label_of][grid.measured == 1].tolist()
 
@@ -358,7 +357,6 @@ def test_a_real_floor_is_a_small_file_and_read_exactly(data, tmp_path, floor_nam
 
 @pytest.fixture
 def map_file(floor, tmp_path):
-    """The floor as a ROS map, with its rooms beside it."""
     grid, rooms = floor
     hn.save_rooms(tmp_path / "rooms.yaml", rooms, grid)
     return write_ros(tmp_path, "f", np.where(FLOOR == 0, 0, 254), SIDE)

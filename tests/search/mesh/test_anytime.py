@@ -23,7 +23,6 @@ Cell = tuple[int, int]
 
 
 def some_cells(free: NDArray[np.bool_], seed: int, number: int) -> list[Cell]:
-    """Free cells drawn at random."""
     rng = np.random.default_rng(seed)
     cells = np.argwhere(free)
     return [(row, col) for row, col in cells[rng.integers(len(cells), size=number)].tolist()]
@@ -37,7 +36,6 @@ def scattered() -> NDArray[np.bool_]:
 
 
 def between(search: MeshSearch, start: Cell, goal: Cell, **effort: Any) -> MeshPath:
-    """The path between the centres of two cells."""
     centres = (start[0] + 0.5, start[1] + 0.5), (goal[0] + 0.5, goal[1] + 0.5)
     return search.path((start, goal), centres, **effort)
 

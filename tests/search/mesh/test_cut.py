@@ -186,7 +186,6 @@ def test_corners_at_which_walls_run_straight_on_are_left_out(kind: str) -> None:
 
 
 def without(free: Any, closed: Any) -> Any:
-    """Free cells that are not closed."""
     left = free.copy()
     left.ravel()[closed] = False
     return left

@@ -81,7 +81,6 @@ def test_each_free_cell_knows_a_polygon_round_its_centre(classes: Any) -> None:
 
 
 def searches(mesh: ConvexMesh) -> list[MeshSearch]:
-    """A search of each kind."""
     return [search_of(mesh, kind) for kind in KINDS]
 
 

@@ -38,7 +38,6 @@ QUICK_FILES = 4
 
 
 def searches(free: NDArray[np.bool_]) -> tuple[JumpSearch, JumpSearch]:
-    """One of the graph of free cells, and one of the contracted graph."""
     graph = build_jump_graph(free)
     return JumpSearch(graph), JumpSearch(contract_graph(graph))
 
@@ -59,7 +58,6 @@ def assert_shortest(
 
 
 def assert_all_pairs(free: NDArray[np.bool_]) -> None:
-    """Assert that the paths between all pairs of free cells are shortest."""
     both, moves = searches(free), move_graph(free)
     cells = [(row, col) for row, col in np.argwhere(free).tolist()]
     for start in cells:

@@ -414,7 +414,6 @@ class FloorNames:
         return list(dict.fromkeys(known))
 
     def _on_one_floor(self, name: str, floor: str | None) -> tuple[str, str]:
-        """Return the floor that has a name, and the name."""
         having = [each for each, one in self._on(floor).items() if name in one.names(points=True)]
         if len(having) == 1:
             return having[0], name

@@ -30,11 +30,6 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
     pose
         `(x, y, yaw)` of its frame in the new one, in metres and radians.
 
-    Returns
-    -------
-    FloorGraph
-        With nodes, lines, doors and areas moved.
-
     Raises
     ------
     InvalidValueError

@@ -367,7 +367,6 @@ class Building:
         goal: FloorWaypoint,
         asked: _Asked,
     ) -> BuildingAlternatives:
-        """Return plans with the reasons why there is no route."""
         if found[0].solved:
             return found
         shut = why.shut_of(asked.blocked, asked.closed_links, stairs=asked.stairs)

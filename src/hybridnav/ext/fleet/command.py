@@ -101,7 +101,6 @@ def _plan_figures(
     waypoints: Sequence[Any],
     typed: list[str],
 ) -> dict[str, Any]:
-    """Return the figures of a plan or tour, its words, and what is closed."""
     figures = _tour_figures(legs, waypoints, args) if args.via else legs[0].to_dict()
     shut = [item.what for item in building.journal.items()] if building.journal else []
     return figures | {
@@ -192,7 +191,6 @@ def _typed(end: str | tuple[float, ...]) -> str:
 def _closures(
     building: hn.ext.fleet.Building, blocked: Sequence[str]
 ) -> tuple[list[str], dict[str, hn.Blocked]]:
-    """Return the closed links, and what is closed on each floor."""
     # Loads numpy, which help can do without.
     from hybridnav.ext.fleet.links import ClosedLink  # noqa: PLC0415
 

@@ -204,7 +204,6 @@ def _rows(report: BuildingGraphReport) -> list[list[str]]:
 
 
 def _picture(check: GraphCheck, title: str | None) -> str:
-    """Return the picture of a check as the address of an image."""
     from hybridnav.graphs import plot_graph_check  # noqa: PLC0415 - loads matplotlib
     from hybridnav.viz.canvas import picture_bytes  # noqa: PLC0415
 

@@ -74,11 +74,6 @@ def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
     matched
         The graph, matched to the building.
 
-    Returns
-    -------
-    BuildingGraphCheck
-        The findings.
-
     Raises
     ------
     InvalidValueError
@@ -307,11 +302,6 @@ def judge_building_graph(
     clear_edges_only
         Whether edges and rides that the robot cannot follow are left out; else the graph is taken
         as it is.
-
-    Returns
-    -------
-    BuildingGraphReport
-        The figures.
 
     Raises
     ------

@@ -111,11 +111,6 @@ def match_graph(
         squared distances. Links that are drawn in another place than the others, and the walls,
         suggest are not followed. Floors at which no such link stops stay as they are.
 
-    Returns
-    -------
-    MatchedGraph
-        For `check_building_graph` and `judge_building_graph`.
-
     Raises
     ------
     InvalidValueError
@@ -173,7 +168,6 @@ def _placed(graph: FloorGraph, pose: Pose, floor: Floor) -> FloorGraph:
 def _matched_floors(
     building: Building, graph: BuildingGraph, given: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return the building's name of each floor of a graph that it has."""
     known = [floor.name for floor in building.floors]
     found = {floor.name: floor.name for floor in graph.floors if floor.name in known}
     for name, own in given.items():
@@ -196,7 +190,6 @@ def _matched_floors(
 
 
 def _poses(building: Building, graph: BuildingGraph, own_name: dict[str, str]) -> dict[str, Pose]:
-    """Return the pose of each floor at which a link stops that the building has too."""
     own_links = {link.name: link for link in building.links}
     poses = {}
     for name, own in own_name.items():

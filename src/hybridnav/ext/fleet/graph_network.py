@@ -180,7 +180,6 @@ class BuildingNetwork:
         return bool(floor.sight.clear(start[None], goal[None])[0])
 
     def _legs(self, nodes: list[int]) -> tuple[list[tuple[PlacedFloor, list[int]]], list[Lane]]:
-        """Return the nodes of a route floor by floor, and the rides between."""
         legs = [(self._floor_of(nodes[0]), [nodes[0]])]
         rides = []
         for one, other in itertools.pairwise(nodes):
@@ -233,7 +232,6 @@ class BuildingNetwork:
         return next(f for f in reversed(self.floors.values()) if f.base <= node)
 
     def _node(self, link: MatchedLink, floor: str) -> int:
-        """Return the node of a floor at the end of a link."""
         node = node_at(self._of_name[floor].graph.graph, link.ends[floor])
         assert node is not None  # noqa: S101 - links are joined
         return node

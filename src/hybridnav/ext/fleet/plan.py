@@ -256,7 +256,6 @@ class Answers:
         bound: float,
         stats: PlanStats,
     ) -> BuildingPlan:
-        """Return the plan of one route, of its parts and their results."""
         parts, results = route
         rides = tuple(itertools.starmap(self._ride, itertools.pairwise(parts)))
         floors = [self._floors[self._floor_of(part, endpoints)] for part in parts]

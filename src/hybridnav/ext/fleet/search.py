@@ -189,7 +189,6 @@ class LinkSearch:
         return self._closed.get(floor, self._tables[floor].closed)
 
     def _floor_of(self, part: Part) -> int:
-        """Return the floor that a part lies on."""
         return self._start.floor if part[0] == START else self._network.ends[part[0]].floor
 
     def _divide(self, floor: int) -> None:
@@ -263,7 +262,6 @@ class LinkSearch:
         return self._of_floor[floor]
 
     def _expected(self, part: Part) -> float:
-        """Return the cost of a part if it is known, else its lower bound."""
         costs, key = self._slot(part)
         return float((costs.known if self._is_known(part) else costs.lower)[key])
 
@@ -327,7 +325,6 @@ class LinkSearch:
         return None
 
     def _to_goal(self) -> dict[int, float]:
-        """Return the least cost to the goal from each end at which a ride has ended."""
         backward: dict[int, list[tuple[int, float]]] = {}
         for node in range(len(self._network.ends)):
             for part in self._parts_from(node):

@@ -178,7 +178,6 @@ def _widened(cells: BoolArray) -> BoolArray:
 
 
 def _beside(number_of: IntArray, numbers: BoolArray) -> BoolArray:
-    """Return which numbers have a boundary with one of some numbers."""
     found = np.zeros(len(numbers), np.bool_)
     pairs = (number_of[1:], number_of[:-1]), (number_of[:, 1:], number_of[:, :-1])
     for one, other in pairs:
@@ -229,11 +228,6 @@ def carry_costs(layer: CostLayer, before: OccupancyGrid, after: OccupancyGrid) -
         A layer of the older map.
     before, after
         The maps; the newer one has to cover the older one, cell on cell.
-
-    Returns
-    -------
-    CarriedCosts
-        The layer on the newer map, and the cells that are outdated.
 
     Raises
     ------
@@ -362,7 +356,6 @@ def events_of(
 
 
 def _renumber(draft: CellDraft, name: dict[int, int]) -> None:
-    """Write other numbers of places in place of some."""
     if not name:
         return
     tiles, rows = draft.tiles, draft.places.read([*name])

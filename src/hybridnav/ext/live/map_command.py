@@ -161,7 +161,6 @@ def map(  # noqa: A001 - the command's name
 
 
 def _last_map(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid | None:
-    """Return the last map of a topic, None for a topic without maps."""
     from hybridnav.ext.live.files.bag_files import GRID, Bag  # noqa: PLC0415 - on demand
 
     if topic not in Bag(bag).topics_of({GRID}):
@@ -170,7 +169,6 @@ def _last_map(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid 
 
 
 def _write_map(grid: hn.OccupancyGrid, out: Path, as_json: bool) -> None:  # noqa: FBT001 - private
-    """Write the map of a bag."""
     hn.write_ros_map(grid, out)
     rows, cols = grid.shape
     if as_json:

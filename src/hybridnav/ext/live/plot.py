@@ -145,7 +145,6 @@ class ReplayAnimation:
         save_frames([self._drawn(frame, view) for frame in frames], times, file)
 
     def _panels(self, frame: _Frame) -> list[_Panel]:
-        """Return the maps of a frame, that of the rooms last."""
         grid, rooms = frame.grid, frame.rooms
         is_free = grid.classes == CellClass.FREE
         n_places = len(np.unique(frame.place_of[is_free]))
@@ -192,7 +191,6 @@ def _draw_panel(canvas: Canvas, panel: _Panel) -> None:
 
 
 def _write_rooms(canvas: Canvas, rooms: OnlineRooms) -> None:
-    """Write the names of rooms, and draw doors as dots with their numbers."""
     doors = [door for door in rooms.doors.values() if not door.is_gap]
     dots = Line2D(
         *np.reshape([door.position for door in doors], (-1, 2)).T,

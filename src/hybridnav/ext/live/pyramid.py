@@ -120,11 +120,6 @@ class OnlinePyramid:
             until an update states them, and `pyramid` refuses such a version. None compares all
             cells, as do grids with another radius or other thresholds.
 
-        Returns
-        -------
-        Update
-            The next version, and what became of the places.
-
         Raises
         ------
         InvalidValueError

@@ -165,7 +165,6 @@ def _check_every(name: str, every: int, what: str) -> None:
 
 
 def _with_last(grids: Iterable[OccupancyGrid]) -> Iterator[tuple[int, OccupancyGrid, bool]]:
-    """Yield the number of each grid, the grid, and whether it is the last one."""
     number, waiting = -1, None
     for number, grid in enumerate(grids):
         if number:

@@ -97,7 +97,6 @@ def replay(
 
 
 def _is_log(files: Sequence[Path]) -> bool:
-    """Return whether the one file is a log and no map."""
     maps = [file.suffix.lower() in _MAP_ENDINGS for file in files]
     if any(maps) and not all(maps):
         raise common.UsageError(
@@ -112,7 +111,6 @@ def _is_log(files: Sequence[Path]) -> bool:
 def _read(
     files: Sequence[Path], robot_radius_m: float | None, max_cells: int, advance: Progress
 ) -> Iterator[hn.OccupancyGrid]:
-    """Yield the maps of some files."""
     for at, file in enumerate(files):
         yield hn.load_map(file, robot_radius_m=robot_radius_m, max_cells=max_cells)
         advance(at + 1, len(files))
@@ -141,7 +139,6 @@ class _Log:
     def grids(
         self, resolution_m: float, every: int, robot_radius_m: float | None, advance: Progress
     ) -> Iterator[hn.OccupancyGrid]:
-        """Yield the map as it grows."""
         from hybridnav.ext.live import grids_of_scans  # noqa: PLC0415
         from hybridnav.ext.live.mapping import Mapper  # noqa: PLC0415 - loads numba
 

@@ -147,11 +147,6 @@ class OnlineRooms:
         grid
             The map now; it has to cover the one of this version, cell on cell.
 
-        Returns
-        -------
-        RoomsUpdate
-            The next version, and what became of rooms, doors and names.
-
         Raises
         ------
         InvalidValueError
@@ -372,7 +367,6 @@ class RoomsUpdate:
 
 
 def _numbers(names: tuple[str, ...]) -> list[int]:
-    """Return the numbers of rooms by their names."""
     found = [NUMBERED.fullmatch(name) for name in names]
     taken = {int(match[1]) for match in found if match}
     free = iter(n for n in range(1, len(names) + len(taken) + 1) if n not in taken)

@@ -375,7 +375,6 @@ def _same(one: OnlineDoor, other: OnlineDoor) -> bool:
 
 
 def _parts(old: list[OnlineDoor], new: list[OnlineDoor]) -> dict[int, list[int]]:
-    """Return the new doors that have cracks of each old door, for those with any."""
     if not old or not new:
         return {}
     cracks = np.concatenate([door.cracks for door in new])

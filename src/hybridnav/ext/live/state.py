@@ -135,7 +135,6 @@ class PlaceTable:
         return numbers
 
     def _has(self, numbers: LongArray) -> BoolArray:
-        """Return which of some numbers have a row."""
         at = np.searchsorted(self._numbers, numbers)
         inside = at < len(self._numbers)
         found: BoolArray = inside.copy()
@@ -153,7 +152,6 @@ class PlaceTable:
             self._is_own, self._columns = True, None
 
     def _copy(self, stays: LongArray, more: int) -> None:
-        """Copy some rows, with space for more."""
         rows = np.zeros(len(stays) + more + _SPACE, PLACE)
         numbers = np.full(len(rows), _NONE)
         numbers[: len(stays)] = self._numbers[stays]

@@ -237,7 +237,6 @@ class Tiles:
         return {(row, col): tile for row, of in self._rows.items() for col, tile in of.items()}
 
     def _get(self, key: tuple[int, int]) -> Tile:
-        """Return a tile, an empty one where there is none."""
         return self._rows.get(key[0], {}).get(key[1], _EMPTY)
 
     def _set(self, key: tuple[int, int], tile: Tile) -> None:

@@ -178,7 +178,6 @@ class _Answers:
         ]
 
     def _floor(self, request: Request) -> Any:
-        """Return what is there of the floor in an address."""
         return self._shown.floor(request.path_params["floor"])
 
     def _session(self, request: Request) -> Session:

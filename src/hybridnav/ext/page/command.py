@@ -226,7 +226,6 @@ class BuildingPage:
 
 
 def _rooms_files(floors: Sequence[FloorEntry], folder: Path) -> dict[str, RoomsFile]:
-    """Return the files of rooms that a description names in its folder, by floor."""
     from hybridnav.ext.page.kept import RoomsFile  # noqa: PLC0415 - loads numpy
 
     files = {}

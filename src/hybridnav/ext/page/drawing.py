@@ -277,7 +277,6 @@ class PagePlanning:
         return self._under(query).plan(*points, blocked=closed)
 
     def _under(self, query: ask.PathQuery) -> HybridPlanner:
-        """Return the planner of the preset of a query, under its profile."""
         planner = self.planner(query.preset)
         return planner if query.profile is None else under(planner, query.profile)
 
@@ -339,7 +338,6 @@ class PagePlanning:
         return Blocked(polygons=areas, **shut)
 
     def _facts(self, result: PlanResult) -> dict[str, Any]:
-        """Return the figures and the line of a plan."""
         path = result.path
         lines = [] if path is None else [ask.in_grid(path.points, self.grid)]
         parts = [{"floor": 0, "line": line} for line in lines]
@@ -347,7 +345,6 @@ class PagePlanning:
         return ask.facts_of(result, parts) | {"length_m": ask.finite(length_m)}
 
     def _itinerary(self, tour: Tour, language: str) -> dict[str, Any]:
-        """Return rooms, doors and words of a plan."""
         return {
             "legs": [
                 {

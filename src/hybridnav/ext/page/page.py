@@ -192,7 +192,6 @@ def _length_m(route: dict[str, Any]) -> float:
 
 
 def _in_languages(site: Site, query: PlanQuery) -> dict[str, Any]:
-    """Return a plan, what it says by language."""
     plans = {
         code: site.routes(query).plan(query.model_copy(update={"language": code}))
         for code in languages()

@@ -333,7 +333,6 @@ class _OverFloors:
         return self._facts(plan, query.language) | ({} if query.brief else self._words(plan, query))
 
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
-        """Return some routes by different links."""
         start, goal = self._ends(query)
         building, how = self.building(query.preset), self._how(query)
         found = building.alternatives(start, goal, query.count, **how)
@@ -359,7 +358,6 @@ class _OverFloors:
         return Tour(tuple(here), ())
 
     def _words(self, plan: BuildingPlan, query: PathQuery) -> dict[str, Any]:
-        """Return the lines of a plan, which call its goal by its name."""
         source = plan.instructions_source
         if query.goal.name is not None and isinstance(source, GuidedRoute):
             plan = replace(plan, instructions_source=replace(source, goal=query.goal.name))
@@ -396,7 +394,6 @@ class _OverFloors:
         return how | {"profile": query.profile}
 
     def _facts(self, plan: BuildingPlan, language: str) -> dict[str, Any]:
-        """Return the figures and lines of a plan, its rides, and why there is none."""
         number_of = self._number_of
         parts = []
         for name, result in zip(plan.floors, plan.results, strict=True):

@@ -49,7 +49,6 @@ def read_yaml_graph(data: Any, where: str, name: str) -> WaypointGraph:
 
 
 def _add_node(gathered: Gathered, entry: Any, pose_of: _Poses, where: str) -> None:
-    """Add a node and the edges that begin there."""
     node = entry.get("node") if isinstance(entry, dict) else None
     if not isinstance(node, dict) or "name" not in node:
         raise MapError(f"{where}: expected a mapping 'node' with a 'name', got {entry!r:.60}")
@@ -158,14 +157,12 @@ class _Reader(XmlReader):
             self._key, self._text = given.get("key", ""), []
 
     def characters(self, text: str) -> None:
-        """Take text of a value."""
         if self._key is not None:
             self._text.append(text)
             if sum(map(len, self._text)) > _MOST_TEXT:
                 raise MapError(f"{self._where}: a value of more than {_MOST_TEXT} characters")
 
     def end(self, tag: str) -> None:
-        """End an element."""
         tag = tag.rpartition(" ")[2]
         if tag == "data" and self._key is not None:
             name, kind = self._keys.get(self._key, (self._key, "string"))
@@ -303,7 +300,6 @@ def read_text_graph(text: str, where: str, name: str) -> WaypointGraph:
 
 
 def _take(node: _Node, section: str, word: str, where: str) -> None:
-    """Take one line of a section."""
     parts = [part.strip() for part in word.split(",")]
     if section == "node" and not node.name:
         node.name = word

@@ -106,7 +106,6 @@ class DoorsInSight:
         return way if is_forward else way + math.pi
 
     def _way_through(self, door: Door) -> float:
-        """Return the direction from the first room of a door to the other."""
         labels, cols = self._rooms.labels, self._rooms.grid.shape[1]
         first, other = (-1 if name is None else labels.index(name) for name in door.rooms)
         flat = self._rooms.cells_beside(door.number)
@@ -262,7 +261,6 @@ class DoorsInSight:
         return door.rooms[1] if door.rooms[0] == room else door.rooms[0]
 
     def _alike(self, door: Door, room: str | None) -> list[Door]:
-        """Return the doors of a room, or its openings, whichever a door is."""
         doors = self._doors_of.get(room, ())
         return [other for other in doors if other.is_opening == door.is_opening]
 

@@ -98,7 +98,6 @@ class Guide:
         return leg if kind is None else replace(leg, shape=kind.name)
 
     def _shape(self, vertex: int, cells: LongArray) -> Shape:
-        """Return the shape of a vertex of the room level, for a path in it."""
         rooms, level = self._rooms, self._rooms.level
         if rooms.label_of_vertex[vertex] >= 0:
             return "room"

@@ -93,11 +93,6 @@ def check_language(language: str) -> Language:
     language
         A code such as `"en"`.
 
-    Returns
-    -------
-    Language
-        Its templates.
-
     Raises
     ------
     InvalidValueError
@@ -174,7 +169,6 @@ class _Writer:
         self.words = words
 
     def line(self, instruction: Instruction) -> str:
-        """Return the sentence of an instruction."""
         words, turn, doorway = self.words, instruction.turn, instruction.doorway
         inside, lead = self._space(instruction.space).inside, self._lead(instruction)
         if doorway is not None:
@@ -226,7 +220,6 @@ class _Writer:
         return words.at_beside.format(landmark=self._landmark(landmark), beside=beside)
 
     def _place(self, side: Side) -> str:
-        """Return the words for a place at one hand."""
         where, _, hand = side.rpartition("-")
         words = self.words.left if hand == "left" else self.words.right
         return {"ahead": words.ahead, "behind": words.behind}.get(where, words.beside)
@@ -242,7 +235,6 @@ class _Writer:
         )
 
     def _arrival(self, instruction: Instruction) -> str:
-        """Return the template of an arrival."""
         if instruction.waypoint is None:
             return self.words.arrive_at_goal
         is_room = instruction.waypoint == instruction.space.name
@@ -351,7 +343,6 @@ class _Writer:
         return self.words.left if hand == "left" else self.words.right
 
     def _space(self, space: Space) -> SpaceWords:
-        """Return the words for a space, with its name filled in."""
         if space.name is None:
             return getattr(self.words, space.shape)
         if space.shape != "room":

@@ -189,11 +189,6 @@ def chords_of(grid: OccupancyGrid, points: ArrayLike, headings_rad: ArrayLike) -
         The direction of travel at each point, shape (n,), finite, counter-clockwise from the x
         axis.
 
-    Returns
-    -------
-    Chords
-        The polyline, the length of the path, and its faults.
-
     Raises
     ------
     InvalidValueError

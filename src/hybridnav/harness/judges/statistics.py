@@ -237,11 +237,6 @@ def thrun_count(n_nodes: float, mean_plan_length: float) -> float:
     mean_plan_length
         Mean number of steps of a plan in it.
 
-    Returns
-    -------
-    float
-        The product.
-
     Notes
     -----
     S. Thrun: Learning metric-topological maps for indoor mobile robot navigation, 1998.

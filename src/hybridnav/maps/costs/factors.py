@@ -339,7 +339,6 @@ def holding_centres(grid: OccupancyGrid, marked: BoolArray, frame: Frame | None)
 
 
 def _is_cell_by_cell(grid: OccupancyGrid, mask: AnyArray, frame: Frame | None) -> bool:
-    """Return whether each cell of a mask is one of the map."""
     if frame is None and mask.shape != grid.shape:
         raise InvalidValueError(
             f"a mask of shape {mask.shape} is not that of a map of shape {grid.shape}: give the "

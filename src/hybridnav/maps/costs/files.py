@@ -149,11 +149,6 @@ def load_speed_mask(  # noqa: PLR0913 - the last six have defaults
     max_cells
         The most cells that the mask may have.
 
-    Returns
-    -------
-    CostLayer
-        The factors of the map's cells.
-
     Raises
     ------
     MapNotFoundError

@@ -123,7 +123,6 @@ class _Reader(XmlReader):
         self._builder = TreeBuilder()
 
     def start(self, tag: str, given: dict[str, str]) -> None:
-        """Begin an element."""
         if self._depth == 1 and tag != "sdf":
             raise MapError(
                 f"{self._where}: expected SDF, whose first element is sdf, got {tag!r:.40}"
@@ -131,17 +130,14 @@ class _Reader(XmlReader):
         self._builder.start(tag, given)
 
     def end(self, tag: str) -> None:
-        """End an element."""
         self._builder.end(tag)
 
     def parse(self, text: str, parser: expat.XMLParserType) -> None:
-        """Parse a text."""
         parser.CharacterDataHandler = self._builder.data
         super().parse(text, parser)
 
     @property
     def root(self) -> Element:
-        """The first element."""
         return self._builder.close()
 
 

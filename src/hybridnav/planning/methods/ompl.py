@@ -117,7 +117,6 @@ class Sampled:
 def _query_of(
     cells: LongArray, endpoints: tuple[FloatArray, FloatArray], closed: ClosedCells | None
 ) -> Query:
-    """Return the query of the base."""
     first, last = cells[[0, -1]].tolist()
     points = endpoints[0][:2], endpoints[1][:2]
     return Query(((first[0], first[1]), (last[0], last[1])), points, closed)
@@ -355,7 +354,6 @@ class OmplPlanner:
         return self._path_through(points, headings, cells, length_m, is_curved=is_curved)
 
     def _curve(self, first: Pose, second: Pose) -> Curve:
-        """Return the shortest curve between two poses."""
         radius_m, reverses = self.ompl.turning_radius_m, self.ompl.space == "reeds-shepp"
         assert radius_m is not None  # noqa: S101 - the space has curves
         return shortest_curve(first, second, radius_m=radius_m, reverses=reverses)

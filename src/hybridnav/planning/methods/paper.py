@@ -158,7 +158,6 @@ class MaxDistance(Method):
         return self._refined(query, began, corridor, route, down.expanded_fields)
 
     def _is_cut(self, found: Found, query: Query) -> bool:
-        """Return whether an answer meets closed cells."""
         closed = query.closed
         return (
             closed is not None and found.has_path and closed.meets(found.cells, self._topology.grid)

@@ -173,7 +173,6 @@ class OverMesh(Method):
         return self._in_sight(query, path.lower_bound_cells, stats)
 
     def _path_round(self, query: Query) -> MeshPath:
-        """Return a shortest path round what is closed."""
         positions, search, left_s = query.positions, self._search, self._budget_s
         if positions is None:
             first, last = (self._frame.position_of(*point.tolist()) for point in query.points)
@@ -199,7 +198,6 @@ class OverMesh(Method):
         return around._replace(lower_bound_cells=bound, expanded=expanded)
 
     def _in_sight(self, query: Query, bound_cells: float, spent: PlanStats) -> Found:
-        """Return the shortest path of cells, shortened by line of sight, with a proved bound."""
         began = clock()
         flat = None if query.closed is None else query.closed.flat
         found = self._refiner.search.search(*query.cells, blocked=flat)
@@ -313,7 +311,6 @@ class OverMesh(Method):
         return cells_of_line(free, positions - low) + low
 
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
-        """Return the search round closed cells, which is cached."""
         # By identity: `Closures` returns the same object for equal closures.
         found = self._detours.get(closed)
         if found is None:

@@ -131,7 +131,6 @@ def read_entries(marked: Marked, where: str, grid: OccupancyGrid) -> Read:
 
 
 def _read_room(read: Read, entry: dict[str, Any], line: int, grid: OccupancyGrid) -> None:
-    """Add an entry of a room, or an outline to the room that has its name."""
     name = entry["name"]
     is_new = name not in read.names
     if is_new:
@@ -173,7 +172,6 @@ def _read_room(read: Read, entry: dict[str, Any], line: int, grid: OccupancyGrid
 
 
 def _use(entry: dict[str, Any], at: str) -> RoomUse:
-    """Return the use of a room from its entry in the file."""
     for key, word in (("use", "private"), ("prefer", "corridor")):
         if entry.get(key, word) != word:
             raise RoomsError(f"{at}: {key} must be {word}, got {brief(entry[key])}")

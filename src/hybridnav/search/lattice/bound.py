@@ -100,7 +100,6 @@ def _bound_of(
     cells: tuple[Cell, Cell],
     known: float,
 ) -> tuple[float, LongArray, FloatArray]:
-    """Return the bound, and cells and slopes of its potential."""
     corners: list[Any] = []
     joins = 0.0
     covered, slopes = np.empty((0, 2), np.int64), np.empty((0, 2))

@@ -21,7 +21,6 @@ class Plain:
 
     @property
     def directed(self):
-        """The graph of networkx."""
         graph: nx.DiGraph[Any] = nx.DiGraph(name="drawn")
         for node, (x, y) in self.points.items():
             graph.add_node(node, x=x, y=y)

@@ -30,7 +30,6 @@ ROOMS = (
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a map of two rooms, and their names."""
     grid = hn.OccupancyGrid(WALLS, hn.Frame(0.5), name="two rooms", robot_radius_m=0)
     hn.write_ros_map(grid, tmp_path / "two.yaml")
     (tmp_path / "rooms.yaml").write_text(ROOMS, encoding="utf-8")

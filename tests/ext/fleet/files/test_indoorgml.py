@@ -87,7 +87,6 @@ def _by_id(members):
 
 
 def _check_duality(layer):
-    """Each dual names the one that names it, and each cell its boundaries."""
     primal, dual = layer["primalSpace"], layer["dualSpace"]
     cells, nodes = _by_id(primal["cellSpaceMember"]), _by_id(dual["nodeMember"])
     lines, edges = _by_id(primal["cellBoundaryMember"]), _by_id(dual["edgeMember"])
@@ -318,7 +317,6 @@ def test_a_number_that_json_cannot_hold_is_refused(tmp_path, number):
 
 
 def _places(value, path=()):
-    """All places in a nested value."""
     items = value.items() if isinstance(value, dict) else enumerate(value)
     for key, each in items:
         yield (*path, key)

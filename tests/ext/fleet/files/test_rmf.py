@@ -196,7 +196,6 @@ class Level:
         return [at.real, -at.imag]
 
     def content(self, elevation):
-        """The level as the drawing has it."""
         points = [complex(*point) for point in self.points]
         ends = [end for door in self.doors for end in door]
         measured = [0j, 5 + 0j]
@@ -394,7 +393,6 @@ def test_lanes_are_not_tested_against_doors_without_end(tmp_path, monkeypatch):
 
 
 def told(building):
-    """Kinds and places of all findings."""
     return [
         (found.kind, each.where)
         for floor in building.floors

@@ -30,12 +30,10 @@ class BagWriter:
         self.messages: list[tuple[str, str, int, Any]] = []
 
     def make(self, name: str, **values: Any) -> Any:
-        """A message of a package/Name."""
         package, _, short = name.partition("/")
         return self.store.types[f"{package}/msg/{short}"](**values)
 
     def header(self, frame: str, stamp_ns: int) -> Any:
-        """A header."""
         stamp = self.make(
             "builtin_interfaces/Time", sec=stamp_ns // 10**9, nanosec=stamp_ns % 10**9
         )
@@ -43,18 +41,15 @@ class BagWriter:
         return self.make("std_msgs/Header", **of_ros_1, stamp=stamp, frame_id=frame)
 
     def quaternion(self, turn: Any) -> Any:
-        """A quaternion x, y, z, w."""
         x, y, z, w = map(float, turn)
         return self.make("geometry_msgs/Quaternion", x=x, y=y, z=z, w=w)
 
     def add(self, topic: str, kind: str, stamp_ns: int, message: Any) -> None:
-        """Take a message."""
         self.messages.append((topic, kind, stamp_ns, message))
 
     def add_tf(  # noqa: PLR0913, PLR0917
         self, parent: str, child: str, stamp_ns: int, place: Any, turn: Any, topic: str = "/tf"
     ) -> None:
-        """Take a transform from a child to its parent."""
         x, y, z = map(float, place)
         move = self.make("geometry_msgs/Vector3", x=x, y=y, z=z)
         transform = self.make(
@@ -69,7 +64,6 @@ class BagWriter:
         self.add(topic, TFS, stamp_ns, self.make("tf2_msgs/TFMessage", transforms=[stamped]))
 
     def add_odometry(self, stamp_ns: int, place: Any, turn: Any) -> None:
-        """Take a pose of base in odom."""
         x, y, z = map(float, place)
         point = self.make("geometry_msgs/Point", x=x, y=y, z=z)
         pose = self.make("geometry_msgs/Pose", position=point, orientation=self.quaternion(turn))

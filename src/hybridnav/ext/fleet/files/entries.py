@@ -104,7 +104,6 @@ def read_building_entries(path: PathLike) -> Entries:
 
 
 def _profiles(marked: Marked, where: str, items: list[Any]) -> tuple[Profile, ...]:
-    """Return the profiles of the file."""
     found: dict[str, Profile] = {}
     keys = {one.name: one for one in fields(Profile)}
     for number, item in enumerate(items):
@@ -214,7 +213,6 @@ class _Values:
         self.given, self._at = given, at
 
     def list_of(self, key: str, most: int) -> list[Any]:
-        """Return a list, empty if it is not given."""
         value = self.given.get(key)
         if value is None:
             return []
@@ -225,7 +223,6 @@ class _Values:
         return value
 
     def text(self, key: str) -> str | None:
-        """Return a text, None if it is not given."""
         value = self.given.get(key)
         if value is not None and (not isinstance(value, str) or not value):
             raise MapError(f"{self._at}: {key} must be a text, got {brief(value)}")
@@ -245,7 +242,6 @@ class _Values:
         return value
 
     def number(self, key: str) -> float | None:
-        """Return a finite number, None if it is not given."""
         value = self.given.get(key)
         return None if value is None else _number(value, f"{self._at}: {key}")
 

@@ -317,7 +317,6 @@ def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
 def _stubs(
     graph: RouteGraph, plain: WaypointGraph, floor: str, links: Sequence[Link]
 ) -> list[Stub]:
-    """Return the ends of links that are no nodes, with the nearest nodes that they see."""
     ends = [(link.name, end.position_m) for link in links if (end := link.end_on(floor))]
     ends = [(name, end) for name, end in ends if node_at(plain, end) is None]
     if not ends:
@@ -358,7 +357,6 @@ def _lines(rooms: Rooms, doors: list[Door], floor: str) -> list[DoorLine]:
 
 
 def _areas(rooms: Rooms, tolerance_m: float) -> list[FloorArea]:
-    """Return the outline of the largest part of each room."""
     import shapely  # noqa: PLC0415 - rooms alone need it
 
     from hybridnav.rooms.files.entries import Read  # noqa: PLC0415

@@ -405,11 +405,6 @@ def load_indoorgml(path: PathLike) -> IndoorModel:
     path
         The file.
 
-    Returns
-    -------
-    IndoorModel
-        The layers, their cells, boundaries and edges, and how layers are connected.
-
     Raises
     ------
     MapNotFoundError
@@ -500,7 +495,6 @@ def read_indoor_floors(text: str, where: str, name: str) -> BuildingGraph:
 
 
 def _read_layer(layer: dict[str, Any], where: str) -> tuple[nx.MultiGraph[str], dict[str, str]]:
-    """Return the dual graph of a layer, and the cell of each node by its id."""
     import networkx as nx  # noqa: PLC0415 - on demand
 
     primal = mapping_of(layer.get("primalSpace", {}), where, "primalSpace")

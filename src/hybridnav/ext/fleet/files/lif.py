@@ -112,7 +112,6 @@ def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str,
 
 
 def _stations(layout: dict[str, Any], where: str) -> dict[str, list[str]]:
-    """Return the names of the stations at each node, their ids where they have none."""
     found: dict[str, list[str]] = {}
     for station in _entries(layout, "stations", where):
         name = str(station.get("stationName") or _text(station, "stationId", where))
@@ -156,7 +155,6 @@ def _id_in(text: Any, before: str, after: str = "") -> dict[str, int]:
 
 
 def _speed(edge: dict[str, Any]) -> dict[str, Any]:
-    """Return the speed limit of an edge, the least of all vehicle types."""
     kinds = edge.get("vehicleTypeEdgeProperties")
     limits = [
         limit
@@ -336,7 +334,6 @@ def _lif_out_layouts(building: BuildingGraph, types: list[str]) -> list[dict[str
 
 
 def _floor_ids(floor: FloorGraph) -> tuple[list[str], list[str]]:
-    """Return the ids of the nodes and of the edges of a floor."""
     nodes, edges = (list(map(str, _unique(ids))) for ids in floor.graph.ids)
     return [f"{floor.name}/{node}" for node in nodes], [f"{floor.name}/{e}/edge" for e in edges]
 

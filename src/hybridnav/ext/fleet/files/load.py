@@ -79,7 +79,6 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
 
 
 def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:
-    """Read a graph in the format that its ending or its text shows."""
     try:
         return _read_known(path, suffix, where)
     except MapError as error:

@@ -235,7 +235,6 @@ class _Links:
         """Ways that are lifts, and whether they are links."""
 
     def found(self, floors: list[OsmFloor]) -> list[Link]:
-        """Return all links."""
         for floor in floors:
             for node in itertools.chain.from_iterable(way.refs for way in floor.routes):
                 self._levels_at.setdefault(node, set()).add(floor.level)
@@ -435,7 +434,6 @@ def _shape(ring: osm.OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry
 
 
 def _middle(found: list[Point | None]) -> Point | None:
-    """Return the middle of the points that are there, None without any."""
     known = [end for end in found if end is not None]
     if not known:
         return None
@@ -449,7 +447,6 @@ def _add_doors(
     tags: Mapping[int, osm.Tags],
     points: Mapping[int, Point | None],
 ) -> None:
-    """Add the doors on outlines of areas."""
     added: set[int] = set()
     for way in areas:
         for node in dict.fromkeys(way.refs) if way.id in inside else ():

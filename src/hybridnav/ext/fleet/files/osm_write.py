@@ -129,7 +129,6 @@ class _Writer:
             self._link(link, shapes, areas)
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines of the file."""
         yield "<?xml version='1.0' encoding='UTF-8'?>"
         yield "<osm version='0.6' generator='hybridnav'>"
         for number, (point, tags) in enumerate(self._nodes, start=1):

@@ -211,7 +211,6 @@ class _Reader(XmlReader):
             self.data.tags.setdefault(self._node, {})[key] = value
 
     def end(self, tag: str) -> None:
-        """End an element."""
         if tag == "node":
             self._node = None
         elif tag == "way":

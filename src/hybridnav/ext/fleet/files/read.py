@@ -156,7 +156,6 @@ def _planner(
     preset: PathLike | Preset | None,
     max_cells: int,
 ) -> HybridPlanner:
-    """Make the planner of a floor, with the rooms that the file names."""
     model = load_floor(
         entry, folder, robot_radius_m=robot_radius_m, preset=preset, max_cells=max_cells
     )
@@ -190,7 +189,6 @@ def _at(where: str) -> Iterator[None]:
 
 
 def _joined(entries: Entries, floors: list[Floor], journal: Journal) -> Building:
-    """Return the building of floors and links."""
     by_name = {floor.name: floor for floor in floors}
     links = [_link(entry, by_name) for entry in entries.links]
     stops = {end.floor for link in links for end in link.ends}
@@ -212,7 +210,6 @@ def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
 
 
 def _end(entry: EndEntry, floors: dict[str, Floor], max_radius_m: float) -> LinkEnd:
-    """Return the end of a link at its point, in its room, or at its door."""
     yaw_rad = entry.yaw_rad
     with _at(entry.at):
         place_of_name(entry.floor, tuple(floors), "floor")
@@ -328,7 +325,6 @@ def _planner_of(
 
 
 def _map_of(part: FiledPart, number: int, max_cells: int) -> Model:
-    """Return the model of one map of a building."""
     FLOOR.check_version(part)
     where = f"{part.where}, map {number}"
     return model_of(parts_within(part.stored("model"), where), where, max_cells)

@@ -216,7 +216,6 @@ def read_rmf(data: dict[str, Any], where: str, name: str) -> BuildingGraph:
 def _filled(
     floor: RmfFloor, content: dict[str, Any], taken: set[Name], where: str
 ) -> list[tuple[str, Point]]:
-    """Add vertices and lanes; return the lifts of vertices, with their points."""
     lifts = []
     for number, entry in enumerate(list_of(content.get("vertices"), where, "vertices")):
         at = f"{where}, vertex {number}"

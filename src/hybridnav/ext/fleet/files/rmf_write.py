@@ -229,7 +229,6 @@ def _listed(head: str, entries: Iterable[str]) -> Iterator[str]:
 
 
 def _unique_names(floors: Iterable[FloorGraph]) -> dict[tuple[str, int], str]:
-    """Return the name of each node that has one, unique over all floors."""
     wanted = [
         ((floor.name, node), facts["name"])
         for floor in floors

@@ -138,11 +138,6 @@ def explore(  # noqa: PLR0913 - all but the first have defaults
     progress
         Called with known and all cells in reach.
 
-    Returns
-    -------
-    Exploration
-        The map that the robot made, and its drive.
-
     Raises
     ------
     InvalidValueError

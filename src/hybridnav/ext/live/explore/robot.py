@@ -46,11 +46,6 @@ def laser_all_round(*, max_range_m: float = 8.0, noise_m: float = 0.01) -> Simul
     noise_m
         Standard deviation of readings.
 
-    Returns
-    -------
-    SimulatedLaser
-        The laser.
-
     Examples
     --------
     >>> from hybridnav.ext.live.explore import laser_all_round
@@ -269,7 +264,6 @@ class Robot:
         return int(in_sight(grid, centre, at).sum()) < _SCANS_BESIDE
 
     def _path_to(self, cell: LongArray) -> FloatArray | None:
-        """Return the points of a path to a cell, None if the planner finds none."""
         began = clock()
         from_m, to_m = self.topology.grid.frame.points_of(np.array([self._at, cell]))
         result = HybridPlanner(self.topology, preset="paper").plan(from_m, to_m)

@@ -381,7 +381,6 @@ class _Series:
         self._values.extend(values)
 
     def at(self, stamp_ns: int) -> tuple[FloatArray, FloatArray]:
-        """Return rotation and translation at a time."""
         stamps, values = self._in_order()
         if self.is_static:
             return rotation_of(values[0, 3:]), values[0, :3]

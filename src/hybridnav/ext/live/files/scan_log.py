@@ -208,7 +208,6 @@ class CarmenLog(ScanLog):
                     yield scan
 
     def _lines(self, file: io.BufferedReader) -> Iterator[bytes]:
-        """Yield the lines of the log, an empty one for each that is too long."""
         is_packed = file.read(2) == _GZIP
         file.seek(0)
         most = max(_MOST_UNPACKED, _MOST_TIMES * self.size_bytes) if is_packed else self.size_bytes
@@ -267,7 +266,6 @@ class _LineReader:
         self._max_range_m = math.inf
 
     def scan_of(self, line: bytes) -> LaserScan | None:
-        """Return the scan of a line, None if it holds none that is read."""
         words = line.split()
         if not words:
             return None
