@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 from PIL import Image
 
 import hybridnav as hn
@@ -33,7 +34,7 @@ ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
-LEVELS = (9, -1)
+LEVELS = (10, -1)
 REGION_CELLS = 26_420
 """A tenth of the free cells."""
 STEPS = DescentSettings(field_cells=32, step=2.0)
@@ -186,7 +187,8 @@ def draw_cut(file: Path) -> None:
     ax.plot(*np.asarray(chain).T, color="crimson", linewidth=1.2)
     for (x, y), name in ((START, "start"), (GOAL, "goal")):
         ax.plot(x, y, "o", color="black")
-        ax.annotate(name, (x, y), textcoords="offset points", xytext=(-12, -14))
+        text = ax.annotate(name, (x, y), textcoords="offset points", xytext=(-12, -14))
+        text.set_path_effects([withStroke(linewidth=3, foreground="white")])
     save_figure(ax, file, dpi=130)
 
 

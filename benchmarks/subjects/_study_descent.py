@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
 
 import hybridnav as hn
 from benchmarks.common import print_head, print_row, read
@@ -99,7 +100,9 @@ def plot_levels_of(levels: Data, ax: Axes | None = None) -> Axes:
     means = [means_of(levels, name) for name in SIZES]
     ax.plot(*zip(*means, strict=True), "o-", color=style.INK, lw=1.8, ms=4, zorder=5)
     for name, at in zip(SIZES, means, strict=True):
-        ax.annotate(name, at, textcoords="offset points", xytext=(4, 5), fontsize=8, zorder=6)
+        step = (-3, -11) if SIZES[name] in {1, 4} else (5, 3)  # beside the curve, not on it
+        text = ax.annotate(name, at, textcoords="offset points", xytext=step, fontsize=8, zorder=4)
+        text.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     ax.plot(100, 0, "s", color=style.PATH, ms=6, zorder=6)
     looks: dict[str, dict[str, Any]] = {
         "mean, by cells of the last fields": {"color": style.INK, "marker": "o"},

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from matplotlib.colors import to_rgb
+from matplotlib.image import imread
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from hybridnav.errors import InvalidValueError
@@ -59,6 +61,17 @@ def test_the_loss_chart_shows_how_many_pairs_lose_much(pairs):
     assert (apart > 8).all()  # points
 
 
+def test_marks_of_methods_that_lose_as_much_stand_side_by_side(tmp_path):
+    losses = {name: np.zeros(50) for name in "abcd"} | {"e": np.full(50, 0.1)}
+    ax = plot_losses(losses)
+    ax.get_legend().remove()
+    save_figure(ax, tmp_path / "losses.png", dpi=200)
+    pixels = np.rint(255 * imread(tmp_path / "losses.png")[..., :3])
+    for name, look in method_styles(losses).items():
+        seen = (np.abs(pixels - 255 * np.array(to_rgb(look.colour))) < 2).all(axis=-1).sum()
+        assert seen > 90, name  # pixels; a mark under others shows a few
+
+
 def test_methods_are_told_apart_without_colour():
     several = list(method_styles(f"method {i}" for i in range(35)).values())
     assert len({(one.colour, one.dashes) for one in several}) == 35
@@ -70,7 +83,7 @@ def test_a_method_looks_the_same_in_every_chart():
     styles = method_styles(["a", "b"])
     lines = plot_losses({"b": [0.1]}, styles=styles).lines
     dots = plot_speed({"b": [0.1]}, {"b": 1.0}, styles=styles).lines
-    assert lines[0].get_marker() == dots[0].get_marker() == "s"
+    assert lines[1].get_marker() == dots[0].get_marker() == "s"
     assert lines[0].get_color() == dots[0].get_color() == style.METHODS[1]
 
 
@@ -176,30 +189,14 @@ def test_points_that_are_none_are_refused():
 
 # Machado, Oliveira, Fernandes 2009, "A Physiologically-based Model for Simulation of Color Vision
 # Deficiency", severity 1.0; they act on linear RGB.
-VISION = {
-    "usual": np.eye(3),
-    "protanopia": np.array(
-        [
-            [0.152286, 1.052583, -0.204868],
-            [0.114503, 0.786281, 0.099216],
-            [-0.003882, -0.048116, 1.051998],
-        ]
-    ),
-    "deuteranopia": np.array(
-        [
-            [0.367322, 0.860646, -0.227968],
-            [0.280085, 0.672501, 0.047413],
-            [-0.011820, 0.042940, 0.968881],
-        ]
-    ),
-    "tritanopia": np.array(
-        [
-            [1.255528, -0.076749, -0.178779],
-            [-0.078411, 0.930809, 0.147602],
-            [0.004733, 0.691367, 0.303900],
-        ]
-    ),
-}
+_MATRICES = """
+protanopia    0.152286 1.052583 -0.204868 0.114503 0.786281 0.099216 -0.003882 -0.048116 1.051998
+deuteranopia  0.367322 0.860646 -0.227968 0.280085 0.672501 0.047413 -0.011820 0.042940 0.968881
+tritanopia    1.255528 -0.076749 -0.178779 -0.078411 0.930809 0.147602 0.004733 0.691367 0.303900
+"""
+VISION = {"usual": np.eye(3)}
+for name, *values in map(str.split, _MATRICES.strip().splitlines()):
+    VISION[name] = np.array(values, float).reshape(3, 3)
 PALE = style.rgb(*style.PLACES, strength=style.PALE)
 
 

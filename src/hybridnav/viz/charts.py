@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.markers import MarkerStyle
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
+from matplotlib.transforms import Affine2D
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import TOLERANCE
@@ -39,6 +41,7 @@ _LINEAR_DECADES = 0.4
 _LONGEST_NAME = 32
 _SAMPLES = 400
 """Losses at which a line may fall: more than a page resolves."""
+_MARK_HEIGHT = 0.03  # of the axes
 _MANY = 1000.0
 _FEW = 100.0
 """Span of an axis that has room for more labels than one a decade."""
@@ -65,18 +68,11 @@ class MethodStyle:
 
     def dot(self, sizes: Sizes) -> Line2D:
         """Return a marker without a point in this style."""
-        return Line2D(
-            [],
-            [],
-            color=self.colour,
-            linewidth=1.5 * sizes.line,
-            linestyle="none",
-            marker=self.marker,
-            markersize=6.5 * sizes.line,
-            markeredgecolor=style.INK,
-            markeredgewidth=0.6 * sizes.line,
-            clip_on=False,
-        )
+        size = sizes.line
+        mark = {"marker": self.marker, "ms": 6.5 * size, "mec": style.INK, "mew": 0.6 * size}
+        line = Line2D([], [], color=self.colour, lw=1.5 * size, ls="none", clip_on=False)
+        line.set(**mark)
+        return line
 
 
 @runtime_checkable
@@ -132,8 +128,8 @@ def plot_losses(
 ) -> Axes:
     """Draw, for each method, the share of pairs that lose more than the value below it.
 
-    The share is logarithmic, so that the few worst pairs show; a line ends at the largest loss of
-    its method. The legend has the share of pairs without loss.
+    The share is logarithmic, so that the few worst pairs show; a line ends at its largest loss.
+    Marks of lines that begin as high stand side by side. The legend has the share without loss.
 
     Parameters
     ----------
@@ -168,16 +164,22 @@ def plot_losses(
     # One pair of the most that a method has stands clear of the lower side, where no pair is.
     least = min(0.05, 0.5 / max(map(len, known.values())))
     handles, labels = [], []
+    marks: dict[Line2D, float] = {}
     for name, values in known.items():
-        at = np.geomspace(LEAST_LOSS, max(LEAST_LOSS, values[-1]), _SAMPLES)
-        at = np.array([TOLERANCE, *at])
+        at = np.array([TOLERANCE, *np.geomspace(LEAST_LOSS, max(LEAST_LOSS, values[-1]), _SAMPLES)])
         shares = 1 - np.searchsorted(values, at, side="right") / len(values)
         handles.append(styles[name].line(sizes))
-        line = styles[name].line(sizes)
-        line.set_data(at, shares.clip(least))
-        line.set(drawstyle="steps-post", markevery=[0], solid_joinstyle="round", zorder=3)
+        line, mark = styles[name].line(sizes), styles[name].dot(sizes)
+        line.set(data=(at, shares.clip(least)), drawstyle="steps-post", marker="", zorder=3)
         ax.add_line(line)
+        share = max(shares[0], least)
+        beside = sum(abs(math.log(y / share, least)) < _MARK_HEIGHT for y in marks.values())
+        mark.set_marker(MarkerStyle(mark.get_marker(), transform=Affine2D().translate(beside, 0)))
+        mark.set(data=([TOLERANCE], [share]), zorder=4)  # over all lines
+        marks[mark] = share
         labels.append(f"{_short(name)}: {_percent(1 - shares[0])}")
+    for mark in marks:
+        ax.add_line(mark)
     ax.set_xscale("symlog", linthresh=LEAST_LOSS, linscale=_LINEAR_DECADES)
     ax.set_yscale("log")
     ax.set(xlim=(0.0, largest), ylim=(least, 1.0))
@@ -240,8 +242,7 @@ def plot_speed(  # noqa: PLR0913 - all but two have defaults
     for name, mean in means.items():
         dot = styles[name].dot(sizes)
         handles.append(styles[name].dot(sizes))
-        dot.set_data([times_ms[name]], [mean])
-        dot.set_zorder(3)
+        dot.set(data=([times_ms[name]], [mean]), zorder=3)
         ax.add_line(dot)
         labels.append(f"{_short(name)}: {_rounded(times_ms[name])} ms, {_rounded(100 * mean)} %")
     times = [times_ms[name] for name in means]
