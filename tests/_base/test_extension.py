@@ -21,9 +21,9 @@ def read_text(path: Any, **reading: Any) -> hn.OccupancyGrid:
 
 @pytest.fixture
 def text_maps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package that registers the suffix `.txt`, installed for one test."""
+    """A package that registers the suffix `.digits`, installed for one test."""
     known = extension.extensions
-    everything = {".txt": f"{__name__}:read_text"} | known("formats")
+    everything = {".digits": f"{__name__}:read_text"} | known("formats")
 
     def extensions(group: str) -> Any:
         return everything if group == "formats" else known(group)
@@ -34,8 +34,8 @@ def text_maps(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("text_maps")
 def test_a_map_format_of_another_package_is_read_by_its_suffix(tmp_path: Any) -> None:
-    (tmp_path / "cells.txt").write_text("010\n000\n")
-    grid = hn.load_map(tmp_path / "cells.txt", robot_radius_m=0)
+    (tmp_path / "cells.digits").write_text("010\n000\n")
+    grid = hn.load_map(tmp_path / "cells.digits", robot_radius_m=0)
     assert grid.classes.tolist() == [[1, 0, 1], [1, 1, 1]]
 
 

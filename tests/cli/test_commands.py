@@ -387,7 +387,7 @@ def test_a_bad_map_is_one_line_and_exit_code_3(cli, draw, command, keys, words):
 def test_files_that_are_not_there_or_not_meant(cli, rooms, tmp_path):
     gone = tmp_path / "two\nlines.yaml"
     assert cli("plan", gone, *ENDS).refuses(3, "two\\nlines.yaml", "no such file")
-    assert cli("show", tmp_path).refuses(3, "expected .yaml")
+    assert cli("show", tmp_path).refuses(3, "expected one of .yaml, .yml, .map, .hnm")
     assert cli("show", rooms.with_suffix(".pgm")).refuses(3, "the YAML file that names this image")
     assert cli("show", rooms, "--preset", gone).refuses(3, "preset", "no such file")
     assert cli("show", rooms, "--preset", rooms).refuses(3, "m.yaml: image: unknown key")

@@ -80,11 +80,10 @@ def load_map(
     if loader is None and suffix in extensions("formats"):
         loader = extension("formats", suffix)
     if loader is None:
-        hint = (
-            "pass the YAML file that names this image"
-            if suffix in _IMAGES
-            else "expected .yaml or .yml (ROS map_server), .map (MovingAI) or .hnm (a model)"
-        )
+        known = [*_LOADERS, *(each for each in extensions("formats") if each.startswith("."))]
+        hint = f"expected one of {', '.join(known)}"
+        if suffix in _IMAGES:
+            hint = "pass the YAML file that names this image"
         raise MapError(f"map {printable(path)}: {hint}")
     return loader(
         path,
