@@ -68,7 +68,7 @@ def test_each_package_keeps_to_its_budget_of_lines_and_floors() -> None:
         for name, figure in found.items()
         if figure[0] > BUDGETS[name][0] or figure[1] > BUDGETS[name][1]
     }
-    assert not over, f"(is, limit) of {over}: make it smaller, or say in the pull request why not"
+    assert not over, f"(is, limit) of {over}: make it smaller or raise it; the commit says why"
 
 
 def test_the_head_of_a_file_names_what_is_public_in_it() -> None:
@@ -79,7 +79,7 @@ def test_no_figure_of_the_house_is_above_its_limit(tmp_path):
     found = figures(tmp_path / "plan.png")
     assert found.keys() == LIMITS.keys()
     over = {name: (found[name], most) for name, most in LIMITS.items() if found[name] > most}
-    assert not over, f"(is, limit) of {over}: make it smaller, or say in the pull request why not"
+    assert not over, f"(is, limit) of {over}: make it smaller or raise it; the commit says why"
 
 
 def test_the_page_on_a_plan_walks_files_that_paper_visits():
