@@ -7,6 +7,7 @@ numba knows the types of a kernel only where it has been called.
 
 import ast
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -90,17 +91,13 @@ def test_no_long_tuple_without_names_crosses_the_border_of_a_kernel() -> None:
     assert not found, "\n".join(found)
 
 
+LONG = (
+    "a, b, c, d, e = given|return given[4]|return given[1:]|return 1, 2, 3, 4, 5|return *given, 5"
+)
+
+
 @pytest.mark.parametrize(
-    "body",
-    [
-        "a, b, c, d, e = given",
-        "return given[4]",
-        "return given[1:]",
-        "return 1, 2, 3, 4, 5",
-        "return *given, 5",
-        "other((1, 2, 3, 4, 5))",
-        "five = (1, 2, 3, 4, 5)\n    other(five)",
-    ],
+    "body", [*LONG.split("|"), "other((1, 2, 3, 4, 5))", "five = (1, 2, 3, 4, 5)\n    other(five)"]
 )
 def test_long_tuples_are_found(body: str) -> None:
     assert len(nameless(f"@guarded\n@njit(cache=True)\ndef kernel(given):\n    {body}\n")) == 1
@@ -139,3 +136,29 @@ def test_kernels_return_no_named_tuples_to_python() -> None:
 def _is_made(value: ast.expr | None) -> bool:
     """Whether an expression calls a class."""
     return isinstance(value, ast.Call) and ast.unparse(value.func).rpartition(".")[2][0].isupper()
+
+
+def uncounted(kernels: list[ast.FunctionDef]) -> list[str]:
+    """What makes an array, which is never freed, or returns one, in kernels without counts."""
+    plain = {"min", "max", "abs", "range", "len", "np.int32", "np.int64", "np.uint32", "np.uint64"}
+    of = {one for one in kernels if "_nrt=False" in ast.unparse(one.decorator_list[-1])}
+    may = plain | {one.name for one in of} - {one.name for one in kernels if one not in of}
+    found = []
+    for kernel in of:
+        steps = [step for part in kernel.body for step in ast.walk(part)]
+        arrays = {ast.unparse(one.value) for one in steps if isinstance(one, ast.Subscript)}
+        called = {ast.unparse(one.func) for one in steps if isinstance(one, ast.Call)}
+        returned = {ast.unparse(one.value or one) for one in steps if isinstance(one, ast.Return)}
+        found += [f"{kernel.name}: {what}" for what in called - may | returned & arrays]
+    return found
+
+
+def test_kernels_without_counts_of_references_make_and_return_no_array() -> None:
+    trees = map(ast.parse, map(Path.read_text, SRC.rglob("*.py")))
+    assert not uncounted([node for tree in trees for node, how in _kernels(tree) if how == "njit"])
+
+
+@pytest.mark.parametrize("step", ["x = np.empty(3)", "x = other(a)", "a[0] = 1\n    return a"])
+def test_counts_are_found(step: str) -> None:
+    [(kernel, _)] = _kernels(ast.parse(f"@njit(_nrt=False)\ndef kernel(a):\n    {step}\n"))
+    assert len(uncounted([kernel])) == 1

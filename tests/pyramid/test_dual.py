@@ -82,7 +82,6 @@ def faces_of(level, found):
 
 
 def check_duality(level):
-    """The faces of the dual are the vertices, and Euler's relation holds for each component."""
     dual = level.dual
     sigma, face_of = level.sigma.tolist(), dual.face_of
     phi = {dart: sigma[dart ^ 1] for dart in range(len(sigma))}
@@ -107,7 +106,6 @@ def check_duality(level):
 
 
 def bridges(endpoints):
-    """Edges of a multigraph whose loss would part what they join."""
     pairs = [tuple(sorted(pair)) for pair in endpoints.tolist()]
     times = Counter(pairs)
     graph: nx.Graph[int] = nx.Graph(pair for pair in pairs if pair[0] != pair[1])

@@ -35,7 +35,6 @@ def built(scene, linkage):
 
 
 def sons_of(lower, upper):
-    """For each vertex of the upper level the vertices of the lower one whose cells it holds."""
     inside = lower.field_of >= 0
     pairs = set(zip(upper.field_of[inside].tolist(), lower.field_of[inside].tolist(), strict=True))
     sons: list[list[int]] = [[] for _ in range(upper.n_vertices)]
@@ -55,7 +54,6 @@ def check_fields(pyramid):
 
 
 def check_ways(pyramid):
-    """Ancestors and descendants between every two levels, parents and children between next."""
     for low, high in itertools.combinations_with_replacement(range(len(pyramid)), 2):
         sons = sons_of(pyramid[low], pyramid[high])
         above = np.empty(pyramid[low].n_vertices, dtype=np.int32)
@@ -75,7 +73,6 @@ def check_ways(pyramid):
 
 
 def check_kernels(pyramid):
-    """Kernels and the arcs above make up the arcs below; contracted ones are spanning stars."""
     for lower, upper in itertools.pairwise(pyramid):
         contracted = pyramid.contraction_kernel(lower.index)
         removed = pyramid.removal_kernel(lower.index)

@@ -192,7 +192,6 @@ def test_rules_and_oracle_agree(classes, rng):
 
 
 def is_noticed(rule, seed):
-    """Whether the oracle notices on a random map that a redundancy rule is left out."""
     rng = random.Random(seed)
     weights = [1, 12, 12 * (seed % 2)]
     classes = np.array(rng.choices([0, 1, 2], weights, k=144), dtype=np.uint8)
@@ -207,7 +206,6 @@ def is_noticed(rule, seed):
 
 @pytest.mark.parametrize("rule", sorted(ALL_RULES))
 def test_every_rule_is_needed(rule):
-    """One map in ten shows the rarest."""
     assert any(is_noticed(rule, seed) for seed in range(300))
 
 

@@ -34,7 +34,6 @@ TWO_ROOMS = drawn(
 
 @st.composite
 def grown(draw: st.DrawFn, max_side: int = MAX_SIDE) -> tuple[Scene, hn.DualGraphPyramid]:
-    """A map, and its pyramid with regions of any size; some start at single cells."""
     scene = draw(scenes(max_side))
     pyramid = scene.pyramid(draw(st.sampled_from(LINKAGES)))
     return scene, pyramid.with_regions(draw(st.sampled_from([1, 4, 9, 30, 100, 10**6])))
@@ -63,7 +62,6 @@ def ratings_of(level: Level, arcs: Any) -> Any:
 
 
 def parts_of(cells: Any) -> int:
-    """The number of connected sets of cells of one class."""
     return sum(int(ndimage.label(cells == kind)[1]) for kind in (1, 2))
 
 
@@ -189,7 +187,6 @@ def test_with_rooms_regions_lie_inside_rooms_and_the_rooms_come_above_them(
 
 
 def same_partition(one: Any, other: Any) -> bool:
-    """Whether two maps have the same fields, by whatever numbers."""
     n_pairs = int(np.unique(np.stack([one.ravel(), other.ravel()]), axis=1).shape[1])
     return n_pairs == len(np.unique(one)) == len(np.unique(other))
 

@@ -57,7 +57,6 @@ def two_rooms(rng, resolution_m):
 
 
 def rows_parted(seed, linkage):
-    """Whether two places meet in each row of the doors of two rooms, inside the wall."""
     classes, doors = two_rooms(np.random.default_rng(seed), 0.05)
     grid = occupancy_grid(classes, resolution_m=0.05)
     field_of = hn.DualGraphPyramid.build(grid, linkage=linkage)[-1].field_of

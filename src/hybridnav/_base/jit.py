@@ -34,7 +34,8 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     numba keeps compiled code beside the module or in the user's home. Where it can write to neither
     (a read-only installation, a user without a home) it refuses the function; here nothing is kept.
 
-    `options`: options of `numba.njit`.
+    `options`: options of `numba.njit`. `_nrt=False`, for what neither makes nor returns an array,
+    spares the atomic counts of references round branches: five sixths of the time of `simplify`.
     """
 
     def decorate(function: Any) -> Any:

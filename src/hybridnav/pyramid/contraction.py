@@ -4,7 +4,6 @@ share.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,14 +18,11 @@ from hybridnav.pyramid.kernels import darts as dart_kernels
 from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import hulls as _hull_kernels
-from hybridnav.pyramid.kernels.decimation import Hulls
-from hybridnav.pyramid.kernels.hulls import hulls_of_points
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize
 from hybridnav.pyramid.start import N_CLASSES, Start
 
 
-@dataclass
-class Scratch:
+class Scratch(NamedTuple):
     """Work space of all levels: 17 bytes an edge and 21 a vertex, shared by consecutive passes."""
 
     keys: KeyArray
@@ -41,28 +37,17 @@ class Scratch:
     @classmethod
     def of_size(cls, n_vertices: int, n_edges: int) -> Scratch:
         """Return work space for a level of this size, which suits all levels above it."""
-        return cls(
-            np.empty(n_edges, np.uint64),
-            np.empty(n_edges, np.uint64),
-            np.empty(n_edges, np.uint8),
-            np.empty(n_vertices, np.uint64),
-            np.empty(n_vertices, np.int32),
-            np.empty(n_vertices, np.int32),
-            np.empty(n_vertices, np.int32),
-            np.empty(n_vertices, np.bool_),
-        )
+        by_edge, by_vertex = ("u8", "u8", "u1"), ("u8", "i4", "i4", "i4", "?")
+        arrays = [np.empty(n_edges, kind) for kind in by_edge]
+        return cls._make(arrays + [np.empty(n_vertices, kind) for kind in by_vertex])
 
     def for_level(self, n_vertices: int, n_edges: int) -> Scratch:
         """Return views of the length of a level."""
+        edges, vertices = slice(n_edges), slice(n_vertices)
         return Scratch(
-            self.keys[:n_edges],
-            self.rest[:n_edges],
-            self.state[:n_edges],
-            self.best[:n_vertices],
-            self.matched[:n_vertices],
-            self.parent[:n_vertices],
-            self.kernel_dart[:n_vertices],
-            self.has_leaf[:n_vertices],
+            *(self.keys[edges], self.rest[edges], self.state[edges], self.best[vertices]),
+            *(self.matched[vertices], self.parent[vertices], self.kernel_dart[vertices]),
+            self.has_leaf[vertices],
         )
 
     # Keys and matching are free once the stars are chosen.
@@ -157,14 +142,8 @@ class Decimation:
 
     def plane_map(self) -> CombinatorialMap:
         """Return the current level as a plane map of its own."""
-        darts = self._darts
-        return CombinatorialMap(
-            sigma=darts.sigma.copy(),
-            origin=darts.origin.copy(),
-            protected=darts.protected.copy(),
-            base_edge=darts.base_edge.copy(),
-            n_vertices=self.n_vertices,
-        )
+        sigma, origin, _, protected, base_edge, _ = (array.copy() for array in self._darts)
+        return CombinatorialMap(sigma, origin, protected, base_edge, self.n_vertices)
 
     def exhaust(self) -> None:
         """Contract until no edge may be contracted, and record the level reached."""
@@ -208,7 +187,8 @@ class Decimation:
         scratch = self._scratch.for_level(self.n_vertices, len(self._darts.base_edge))
         self._select(scratch, count)
         self._make_level(scratch)
-        self._note_loops()
+        origin = self._darts.origin
+        self._loops.append(int((origin[::2] == origin[1::2]).sum()))
         self._lap("compaction")
         return True
 
@@ -335,25 +315,18 @@ class Decimation:
             self._steering.merge(scratch.new_vertex[scratch.parent], n_vertices)
         elif len(self._hulls.start):
             merged_into = scratch.new_vertex[scratch.parent]
-            self._hulls = merge_hulls(self._hulls, merged_into, n_vertices)
+            self._hulls = _kernels.Hulls(
+                *_hull_kernels.merged_hulls(*self._hulls, merged_into, n_vertices)
+            )
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
 
     def _close_gaps(self, scratch: Scratch) -> None:
         n_edges = dart_kernels.compact_darts(
             self._darts, scratch.state, scratch.new_edge, self._level, self.record.edge_end
         )
-        sigma, origin, sweep, protected, base_edge = self._darts
-        self._darts = dart_kernels.Darts(
-            sigma[: 2 * n_edges],
-            origin[: 2 * n_edges],
-            sweep[: 2 * n_edges],
-            protected[: 2 * n_edges],
-            base_edge[:n_edges],
-        )
-
-    def _note_loops(self) -> None:
-        origin = self._darts.origin
-        self._loops.append(int((origin[::2] == origin[1::2]).sum()))
+        *by_dart, base_edge, waits = self._darts
+        kept = *(array[: 2 * n_edges] for array in by_dart), base_edge[:n_edges], waits[:n_edges]
+        self._darts = dart_kernels.Darts._make(kept)
 
     def finish(self) -> None:
         """Record the sizes of all levels."""
@@ -371,25 +344,3 @@ class Decimation:
         now = clock()
         self.stats.seconds[stage] = self.stats.seconds.get(stage, 0.0) + now - self._began
         self._began = now
-
-
-# Convex hulls of the fields of a level, from those of the level below.
-
-
-def merge_hulls(hulls: Hulls, merged_into: IntArray, n_vertices: int) -> Hulls:
-    """Compute the hulls of fields from the hulls of their parts.
-
-    `merged_into`: int (n_parts,), the field that each part belongs to; `n_vertices`: number of
-    fields. Result: hulls of the fields.
-    """
-    of_point = np.repeat(merged_into, np.diff(hulls.start))
-    rows, cols = hulls.points.T.astype(np.int64)
-    row_bits, col_bits = (int(part.max(initial=0)).bit_length() for part in (rows, cols))
-    # Sort with numpy: a sort in a kernel takes more than a second to compile.
-    keys = np.sort((of_point.astype(np.int64) << row_bits | rows) << col_bits | cols)
-    points = np.empty((len(keys), 2), np.int32)
-    points[:, 0] = keys >> col_bits & (1 << row_bits) - 1
-    points[:, 1] = keys & (1 << col_bits) - 1
-    offset = np.zeros(n_vertices + 1, np.int64)
-    np.cumsum(np.bincount(of_point, minlength=n_vertices), out=offset[1:])
-    return Hulls(*hulls_of_points(offset, points))

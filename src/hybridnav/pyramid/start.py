@@ -13,6 +13,7 @@ from hybridnav.pyramid.darts import Darts
 from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import throats as _throat_kernels
+from hybridnav.pyramid.kernels.darts import NO_LEVEL
 from hybridnav.pyramid.kernels.decimation import Vertices
 from hybridnav.pyramid.level import Level
 from hybridnav.pyramid.record import SURVIVES, Record
@@ -167,7 +168,8 @@ def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None =
     record, power, new_edge, n_vertices, n_edges = marked
     vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
     first, last = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
-    return Start(record, Darts(*first, *last), vertices, 0, kinds.shape[1])
+    darts = Darts._make((*first, *last, np.full(n_edges, NO_LEVEL, np.uint8)))
+    return Start(record, darts, vertices, 0, kinds.shape[1])
 
 
 def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
@@ -194,6 +196,7 @@ def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
         sweep[(level.base_pairs @ (cols, 1)).ravel()],
         plane.protected.copy(),
         plane.base_edge.copy(),
+        np.full(level.n_arcs, NO_LEVEL, np.uint8),
     )
     return Start(record, darts, vertices, level.index, cols)
 

@@ -5,7 +5,7 @@ import numpy as np
 from hybridnav._base.jit import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def push(heap, size, key, value):
     """Put an entry into a heap of `size`, which then has one more; it has room for that."""
     at = size
@@ -18,7 +18,7 @@ def push(heap, size, key, value):
     heap[at, 0], heap[at, 1] = key, value
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def pop(heap, size):
     """Take the entry with the least key out of a heap of `size`, which then has one fewer."""
     found = heap[0, 1]
@@ -38,7 +38,7 @@ def pop(heap, size):
     return found
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def find(root, i):
     """Return the representative of i in a union-find forest, halving the path."""
     while root[i] != i:

@@ -30,7 +30,7 @@ def uniform_squares(classes):
     return squares
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def amid_its_class(halves, row, col):
     """Return whether the 4x4 squares of half the side round a square are all of one class."""
     if row == 0 or col == 0 or 2 * row + 2 >= halves.shape[0] or 2 * col + 2 >= halves.shape[1]:
@@ -43,7 +43,7 @@ def amid_its_class(halves, row, col):
     return of_class != 0
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def raise_powers(power, squares, halves, p):
     """Put the cells of squares of power p that are amid their class into blocks of that power.
 
@@ -76,24 +76,14 @@ class BaseTemplates(NamedTuple):
 
 
 @guarded
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
     """Fill the record for the blocks alone; return the counts of their vertices and edges.
 
-    Parameters
-    ----------
-    classes
-        (rows, cols), the kinds of cells, 0 for none.
-    power
-        The powers of blocks; see `block_powers`.
-    templates
-        `BaseTemplates`.
-    vertex_end, vertex_parent
-        By flat cell, the record of vertices; filled in.
-    edge_end
-        By base edge, the record of edges; filled in.
-    new_edge
-        int32 by base edge, receives the new numbers of the edges that stay.
+    `classes`: (rows, cols), the kinds of cells, 0 for none; `power`: the powers of blocks, see
+    `block_powers`; `templates`: `BaseTemplates`; `vertex_end`, `vertex_parent`: by flat cell, the
+    record of vertices, filled in; `edge_end`: by base edge, the record of edges, filled in;
+    `new_edge`: int32 by base edge, receives the new numbers of the edges that stay.
     """
     ends, parent = templates.vertex_end, templates.parent
     inside_east, inside_north = templates.inside_east, templates.inside_north
@@ -133,7 +123,7 @@ def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, ne
     return n_vertices, n_edges
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def filled(classes, row, col):
     """Return whether a cell lies on the map and is a vertex."""
     rows, cols = classes.shape
@@ -229,7 +219,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
     return (sigma, origin, sweep), (protected, base_edge)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def protect_faces(sigma, protected):
     """Protect all darts of every face that has a protected dart."""
     for d in range(sigma.size):
@@ -255,7 +245,7 @@ def count_bytes(values):
 _POSITION = np.uint64(0x3FFFFFFF)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def let_survive(origin, keys, cells, cols, survivors, survivors_of_edge):
     """Let certain cells survive whatever they merge with.
 

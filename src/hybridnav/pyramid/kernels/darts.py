@@ -17,9 +17,13 @@ REMOVED = 2
 
 EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
 
+NO_LEVEL = 255
+_BITS = (0, 1, 2, 2, 3, 3, 3, 3)
+"""Bits of the numbers of rows and columns in a block, at most 8 a side."""
+
 
 class Darts(NamedTuple):
-    """The darts of one level, indexed by dart but for `base_edge`, which is indexed by edge."""
+    """The darts of one level, indexed by dart but for `base_edge` and `waits`."""
 
     sigma: np.ndarray
     """int32, next dart counter-clockwise round the vertex."""
@@ -33,9 +37,12 @@ class Darts(NamedTuple):
     """bool, whether the face on the right of the dart is protected."""
     base_edge: np.ndarray
     """int32, id of the edge in the base."""
+    waits: np.ndarray
+    """uint8 by edge, the level at which a redundant edge on a face of it can go, `NO_LEVEL` for
+    none that waits; see `first_together`."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def step_integral(dart, base_edge, cols):
     """Return the integral of x dy along the base step of a dart: zero for steps east and west."""
     base = base_edge[dart >> 1]
@@ -45,7 +52,7 @@ def step_integral(dart, base_edge, cols):
     return col if dart & 1 == 0 else -col
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def loop_area(dart, sweep, base_edge, cols):
     """Return the signed area in cells inside a self-loop, positive for a counter-clockwise dart."""
     step = step_integral(dart, base_edge, cols)
@@ -53,7 +60,7 @@ def loop_area(dart, sweep, base_edge, cols):
 
 
 @guarded
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touched, cols):
     """Contract the stars of a kernel, in place.
 
@@ -62,27 +69,13 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the dart
     after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
 
-    Parameters
-    ----------
-    darts
-        `Darts` of the level; changed.
-    parent
-        int32 (n_vertices,), the vertex that each vertex goes into; itself if it survives.
-    new_vertex
-        int32 (n_vertices,), the number of a survivor on the next level.
-    kernel_dart
-        int32 (n_vertices,), the dart that starts at the parent of v and ends at v.
-    state
-        uint8 (n_edges,), receives `ALIVE` or `CONTRACTED`.
-    inverse
-        int32 (n_darts,), receives the inverse of sigma.
-    shift
-        int32 (n_vertices,), scratch.
-    touched
-        int32, receives one dart of every ordinary face that lost a dart: apart from faces with a
-        self-loop, no other face can have become redundant.
-    cols
-        Columns of the grid.
+    `darts`: `Darts` of the level, changed; `parent`: int32 (n_vertices,), the vertex that each
+    vertex goes into, itself if it survives; `new_vertex`: int32 (n_vertices,), the number of a
+    survivor on the next level; `kernel_dart`: int32 (n_vertices,), the dart that starts at the
+    parent of v and ends at v; `state`: uint8 (n_edges,), receives `ALIVE` or `CONTRACTED`;
+    `inverse`: int32 (n_darts,), receives the inverse of sigma; `shift`: int32 (n_vertices,),
+    scratch; `touched`: int32, receives one dart of every ordinary face that lost a dart: apart from
+    faces with a self-loop, no other face can have become redundant; `cols`: columns of the grid.
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
     protected, base_edge = darts.protected, darts.base_edge
@@ -118,7 +111,7 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     return count, any_loop
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def unlink(dart, sigma, inverse):
     """Take one dart out of its vertex's rotation."""
     before = inverse[dart]
@@ -127,7 +120,7 @@ def unlink(dart, sigma, inverse):
     inverse[after] = before
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
     """Return a dart of a redundant edge on the ordinary face of `start`, and a dart beside it.
 
@@ -159,7 +152,7 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
     return np.int32(-1), np.int32(-1)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def start_cell(dart, base_edge, cols):
     """Return the row and column of the cell where the base edge of a dart starts."""
     base = base_edge[dart >> 1]
@@ -169,91 +162,92 @@ def start_cell(dart, base_edge, cols):
     return cell // cols, cell % cols
 
 
-@njit(cache=True, nogil=True)
-def start_together(dart, partner, darts, whole_at, level, cols):
-    """Return whether two edges between the same vertices start in the same fields.
+@njit(cache=True, nogil=True, _nrt=False)
+def first_together(dart, partner, darts, whole_at, level, cols):
+    """Return the first level at which two edges between the same vertices start in the same fields.
 
-    They do not if one of them ends at a block in pieces: its cells merge along a quadtree, columns
-    of side 2^j at level 2j - 1 and rows at level 2j.
+    It is later than `level` only where one of them ends at a block in pieces: its cells merge along
+    a quadtree, columns of side 2^j at level 2j - 1 and rows at level 2j.
     """
+    first = 0
     for d in (np.int64(dart), np.int64(dart) ^ 1):
         v = darts.origin[d]
-        if whole_at[v] <= level:
-            continue
-        beside = partner if darts.origin[partner] == v else partner ^ 1
-        row, col = start_cell(d, darts.base_edge, cols)
-        other_row, other_col = start_cell(beside, darts.base_edge, cols)
-        by_row, by_col = level >> 1, (level + 1) >> 1
-        if row >> by_row != other_row >> by_row or col >> by_col != other_col >> by_col:
-            return False
-    return True
+        if whole_at[v] > level:
+            beside = partner if darts.origin[partner] == v else partner ^ 1
+            row, col = start_cell(d, darts.base_edge, cols)
+            other_row, other_col = start_cell(beside, darts.base_edge, cols)
+            first = max(first, 2 * _BITS[row ^ other_row], 2 * _BITS[col ^ other_col] - 1)
+    return first
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, all_whole):
     """Remove redundant edges through ordinary faces until none is left, in place.
 
     Rules one and two: a face of degree one, a face of degree two. Rules three and four need a
-    self-loop, and the lower levels have none. A removal can make only the merged face redundant, so
-    every face is followed until it is not.
+    self-loop, and the lower levels have none.
 
-    Parameters
-    ----------
-    darts, state, inverse, cols
-        See `contract`; removed edges become `REMOVED`.
-    touched, any_loop
-        Results of `contract`.
-    whole_at
-        uint8 (n_vertices,), the level from which a block is whole. An edge that ends at a vertex
-        in pieces waits for the pieces to merge, so all of those are looked at again.
-    level
-        The level to make.
-    all_whole
-        Whether no vertex is in pieces at this level.
+    `darts`, `state`, `inverse`, `cols`: see `contract`, removed edges become `REMOVED`; `touched`,
+    `any_loop`: results of `contract`; `whole_at`: uint8 (n_vertices,), the level from which a block
+    is whole: an edge at a vertex in pieces waits for the pieces to merge; `level`: the level to
+    make; `all_whole`: whether no vertex is in pieces at this level.
+    """
+    for start in touched:
+        reduce_face(start, darts, any_loop, state, inverse, cols, whole_at, level)
+    if all_whole and not any_loop:
+        return
+    origin, waits = darts.origin, darts.waits
+    for e in range(waits.size):
+        if waits[e] == level or (any_loop and origin[2 * e] == origin[2 * e + 1]):
+            waits[e] = NO_LEVEL
+            for d in (np.int32(2 * e), np.int32(2 * e + 1)):
+                reduce_face(d, darts, any_loop, state, inverse, cols, whole_at, level)
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def reduce_face(start, darts, any_loop, state, inverse, cols, whole_at, level):
+    """Remove redundant edges through the face of a dart until none is left or one has to wait.
+
+    A removal can make only the merged face redundant, so it is followed. Parameters as `simplify`.
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
     protected, base_edge = darts.protected, darts.base_edge
-    n_darts = 2 * base_edge.size if any_loop or not all_whole else 0
-    for i in range(touched.size + n_darts):
-        start = touched[i] if i < touched.size else np.int32(i - touched.size)
-        if state[start >> 1] != ALIVE:
-            continue
-        if i >= touched.size:
-            v = origin[start]
-            if v != origin[start ^ 1] and (all_whole or whole_at[v] < level):
-                continue
-        while start >= 0 and not protected[start]:
-            second = sigma[start ^ 1]
-            dart = partner = np.int32(-1)
-            if second == start:
-                dart = partner = start
-            elif sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
-                if second != start ^ 1:
-                    dart, partner = max(start, second), min(start, second)
-            elif any_loop:
-                dart, partner = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
-            if dart < 0:
-                break
-            if not all_whole and not start_together(dart, partner, darts, whole_at, level, cols):
-                break
-            other = dart ^ 1
-            # A dart that stays in the merged face: from this side, else from the other.
-            start = sigma[other]
-            if start == dart:
-                start = sigma[dart]
-                if start == other:
-                    start = np.int32(-1)
-            if protected[other]:
-                follow = sigma[other]
-                while follow != dart:
-                    protected[follow] = True
-                    follow = sigma[follow ^ 1]
-            unlink(dart, sigma, inverse)
-            unlink(other, sigma, inverse)
-            state[dart >> 1] = REMOVED
+    if state[start >> 1] != ALIVE:
+        return
+    while start >= 0 and not protected[start]:
+        second = sigma[start ^ 1]
+        dart = partner = np.int32(-1)
+        if second == start:
+            dart = partner = start
+        elif sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
+            if second != start ^ 1:
+                dart, partner = max(start, second), min(start, second)
+        elif any_loop:
+            dart, partner = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
+        if dart < 0:
+            return
+        first = first_together(dart, partner, darts, whole_at, level, cols)
+        if first > level:
+            darts.waits[start >> 1] = min(darts.waits[start >> 1], first)
+            return
+        other = dart ^ 1
+        # A dart that stays in the merged face: from this side, else from the other.
+        start = sigma[other]
+        if start == dart:
+            start = sigma[dart]
+            if start == other:
+                start = np.int32(-1)
+        if protected[other]:
+            follow = sigma[other]
+            while follow != dart:
+                protected[follow] = True
+                follow = sigma[follow ^ 1]
+        unlink(dart, sigma, inverse)
+        unlink(other, sigma, inverse)
+        state[dart >> 1] = REMOVED
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def compact_darts(darts, state, new_edge, level, edge_end):
     """Close the gaps that gone edges left, in place, and return the number of edges that stay.
 
@@ -261,7 +255,7 @@ def compact_darts(darts, state, new_edge, level, edge_end):
     edge, 2 * level + 1 for a removed one.
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
-    protected, base_edge = darts.protected, darts.base_edge
+    protected, base_edge, waits = darts.protected, darts.base_edge, darts.waits
     one = np.uint32(1)
     n_edges = 0
     for e in range(base_edge.size):
@@ -274,7 +268,7 @@ def compact_darts(darts, state, new_edge, level, edge_end):
         if state[e] != ALIVE:
             continue
         f = new_edge[e]
-        base_edge[f >> 1] = base_edge[e]
+        base_edge[f >> 1], waits[f >> 1] = base_edge[e], waits[e]
         for half in range(2):
             d = 2 * e + half
             following = np.uint32(sigma[d])
@@ -291,7 +285,7 @@ def compact_darts(darts, state, new_edge, level, edge_end):
 # the level at which the edge goes, plus one where it is removed and not contracted).
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def next_at_cell(cell, direction, edge_end, cols):
     """Return the first dart of a base cell counter-clockwise after a direction, else -1.
 
@@ -313,7 +307,7 @@ def next_at_cell(cell, direction, edge_end, cols):
     return -1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def base_sigma(dart, edge_end, cols):
     """Return the next dart counter-clockwise in the base."""
     edge = dart >> 1

@@ -63,7 +63,7 @@ class Order(NamedTuple):
     """How many more a row of the map has."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def make_key(attribute, base_edge, order, position):
     """Return the key of an edge: attribute, then a seeded hash (MurmurHash3's finaliser)."""
     edge = np.uint64(base_edge)
@@ -79,24 +79,15 @@ def make_key(attribute, base_edge, order, position):
     return high | h >> np.uint64(11) << np.uint64(30) | np.uint64(position)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def possible_survivors(u, v, cells, boxes, hull_start, hull_points, linkage, limit):
     """Return which of two vertices may survive their merging, or UNDECIDED.
 
     The caller has found that the common box of the fields is too large to decide.
 
-    Parameters
-    ----------
-    u, v
-        The vertices.
-    cells, boxes
-        See `Vertices`.
-    hull_start, hull_points
-        Fields of `Hulls`; both empty before hulls are built.
-    linkage
-        `SURVIVOR`, `RADIUS` or `DIAMETER`.
-    limit
-        The merge distance squared, in squared cells.
+    `u`, `v`: the vertices; `cells`, `boxes`: see `Vertices`; `hull_start`, `hull_points`: fields of
+    `Hulls`, both empty before hulls are built; `linkage`: `SURVIVOR`, `RADIUS` or `DIAMETER`;
+    `limit`: the merge distance squared, in squared cells.
     """
     rows = np.int64(cells[u, 0] - cells[v, 0])
     cols = np.int64(cells[u, 1] - cells[v, 1])
@@ -125,7 +116,7 @@ def possible_survivors(u, v, cells, boxes, hull_start, hull_points, linkage, lim
     return survivors
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def contractible(
     origin, base_edge, vertices, hulls, level, linkage, limit, order, keys, survivors_of_edge, best
 ):
@@ -135,24 +126,11 @@ def contractible(
     merged fields first keeps fields compact (measured 2 to 5 % fewer places on real maps than the
     distance between the surviving cells or the merged radius).
 
-    Parameters
-    ----------
-    origin, base_edge
-        int32 (2 n_edges,) and (n_edges,), as in `Darts`.
-    vertices, hulls
-        `Vertices` and `Hulls` of the level.
-    level
-        Number of the level.
-    linkage, limit
-        See `possible_survivors`.
-    order
-        `Order`, of equal attributes.
-    keys
-        uint64 (n_edges,), filled in.
-    survivors_of_edge
-        uint8 (n_edges,), receives which end of an edge may survive.
-    best
-        uint64 (n_vertices,), receives the least key of each vertex.
+    `origin`, `base_edge`: int32 (2 n_edges,) and (n_edges,), as in `Darts`; `vertices`, `hulls`:
+    `Vertices` and `Hulls` of the level; `level`: number of the level; `linkage`, `limit`: see
+    `possible_survivors`; `order`: `Order`, of equal attributes; `keys`: uint64 (n_edges,), filled
+    in; `survivors_of_edge`: uint8 (n_edges,), receives which end of an edge may survive; `best`:
+    uint64 (n_vertices,), receives the least key of each vertex.
     """
     cells, boxes, classes, whole_at = vertices
     hull_start, hull_points = hulls
@@ -187,25 +165,15 @@ def contractible(
     return count
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def open_candidates(origin, base_edge, arcs, ranks, order, keys, survivors_of_edge, best):
     """Fill `keys` with the keys of some arcs by their ranks; let either endpoint of each survive.
 
-    Parameters
-    ----------
-    origin, base_edge
-        int32 (2 n_edges,) and (n_edges,), as in `Darts`.
-    arcs, ranks
-        int64 (n,), edges that may be contracted, and their attributes, at most `ATTRIBUTE_MAX`: the
-        least first.
-    order
-        `Order`, of equal ranks.
-    keys
-        uint64 (n,), filled in.
-    survivors_of_edge
-        uint8 (n_edges,), receives that either endpoint of these arcs may survive.
-    best
-        uint64 (n_vertices,), receives the least key of each vertex.
+    `origin`, `base_edge`: int32 (2 n_edges,) and (n_edges,), as in `Darts`; `arcs`, `ranks`: int64
+    (n,), edges that may be contracted, and their attributes, at most `ATTRIBUTE_MAX`: the least
+    first; `order`: `Order`, of equal ranks; `keys`: uint64 (n,), filled in; `survivors_of_edge`:
+    uint8 (n_edges,), receives that either endpoint of these arcs may survive; `best`: uint64
+    (n_vertices,), receives the least key of each vertex.
     """
     for v in range(best.size):
         best[v] = _NO_KEY
@@ -219,7 +187,7 @@ def open_candidates(origin, base_edge, arcs, ranks, order, keys, survivors_of_ed
             best[end] = min(best[end], key)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def match(origin, keys, best, matched, rest):
     """Fill `matched` with the greedy maximal matching in the order of keys (Preis 1999).
 
@@ -259,20 +227,13 @@ def match(origin, keys, best, matched, rest):
             best[v] = min(best[v], key)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def join_leaves(origin, keys, survivors_of_edge, matched, best, parent, kernel_dart):
     """Let every vertex without a partner join the best matched neighbour that may survive it.
 
-    Parameters
-    ----------
-    origin, keys, survivors_of_edge
-        See `contractible`.
-    matched
-        int32 (n_vertices,), from `match`.
-    best
-        uint64 (n_vertices,), scratch.
-    parent, kernel_dart
-        int32 (n_vertices,), changed.
+    `origin`, `keys`, `survivors_of_edge`: see `contractible`; `matched`: int32 (n_vertices,), from
+    `match`; `best`: uint64 (n_vertices,), scratch; `parent`, `kernel_dart`: int32 (n_vertices,),
+    changed.
     """
     for v in range(matched.size):
         best[v] = _NO_KEY
@@ -321,7 +282,7 @@ def refuse_leaves(parent, kernel_dart, matched, hulls, limit):
                 last_leaf[p] = v
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def select_stars(
     darts_origin, base_edge, keys, survivors_of_edge, matched, best, vertices, order, stars
 ):
@@ -331,15 +292,9 @@ def select_stars(
     three. In a pair without leaves of which either may survive, the one survives from which the
     corners of the box round both fields lie less far; the hash breaks ties.
 
-    Parameters
-    ----------
-    darts_origin, base_edge, keys, survivors_of_edge, vertices, order
-        See `contractible`.
-    matched, best
-        See `join_leaves`.
-    stars
-        `parent`, `kernel_dart` and `has_leaf` by vertex, filled in; `kernel_dart[v]` starts at the
-        parent of v and ends at v.
+    `darts_origin`, `base_edge`, `keys`, `survivors_of_edge`, `vertices`, `order`: see
+    `contractible`; `matched`, `best`: see `join_leaves`; `stars`: `parent`, `kernel_dart` and
+    `has_leaf` by vertex, filled in; `kernel_dart[v]` starts at the parent of v and ends at v.
     """
     cells, boxes, _, _ = vertices
     parent, kernel_dart, has_leaf = stars
@@ -381,22 +336,14 @@ def select_stars(
             kernel_dart[u] = 2 * edge + 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vertex_parent):
     """Merge boxes into survivors and close the gaps, in place; return the number of survivors.
 
-    Parameters
-    ----------
-    vertices
-        `Vertices` of the level; changed.
-    parent, new_vertex
-        int32 (n_vertices,); `new_vertex` is filled in.
-    cols
-        Columns of the grid.
-    level
-        Number of the level.
-    vertex_end, vertex_parent
-        By flat cell: receive the level at which a surviving cell goes, and the cell it goes into.
+    `vertices`: `Vertices` of the level, changed; `parent`, `new_vertex`: int32 (n_vertices,),
+    `new_vertex` is filled in; `cols`: columns of the grid; `level`: number of the level;
+    `vertex_end`, `vertex_parent`: by flat cell: receive the level at which a surviving cell goes,
+    and the cell it goes into.
     """
     cells, boxes, classes, whole_at = vertices
     count = 0

@@ -5,7 +5,7 @@ import numpy as np
 from hybridnav._base.jit import guarded, njit
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def turn(points, i, j, row, col):
     """Return the cross product of the steps i -> j and j -> (row, col); positive to the left."""
     ax = np.int64(points[j, 1] - points[i, 1])
@@ -15,7 +15,7 @@ def turn(points, i, j, row, col):
     return ax * by - ay * bx
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def chain(rows, cols, count, hand, points, start):
     """Append one half of the hull of points sorted by row (monotone chain, Andrew 1979)."""
     end = start
@@ -62,29 +62,59 @@ def field_hulls(field_of, cols, boxes):
 
 @guarded
 @njit(cache=True, nogil=True)
-def hulls_of_points(offset, points):
-    """Return the convex hulls of the sets `points[offset[v]:offset[v + 1]]`.
+def merged_hulls(start, points, merged_into, n_vertices):
+    """Return the convex hulls of fields from those of their parts.
 
-    The points of a set are sorted by row and then by column.
+    `start`, `points`: see `decimation.Hulls`; `merged_into`: int32 (n_parts,), the field that each
+    part belongs to; `n_vertices`: number of fields.
     """
-    start = np.zeros(offset.size, np.int64)
-    hulls = np.empty((2 * points.shape[0], 2), np.int32)
-    rows = np.empty(points.shape[0], np.int64)
-    cols = np.empty(points.shape[0], np.int64)
+    first_part = np.full(n_vertices, np.int32(-1), np.int32)
+    behind = np.empty(merged_into.size, np.int32)
+    for part in range(merged_into.size):
+        behind[part] = first_part[merged_into[part]]
+        first_part[merged_into[part]] = part
+    new_start = np.zeros(n_vertices + 1, np.int64)
+    hulls = np.empty_like(points)
+    rows, cols = np.empty(points.shape[0], np.int64), np.empty(points.shape[0], np.int64)
     end = 0
-    for v in range(offset.size - 1):
-        low, high = offset[v], offset[v + 1]
-        # Only the first and the last point of a row belong to the left and the right chain.
-        for hand in (-1, 1):
-            count = 0
-            for i in range(low, high):
-                beside = i + hand
-                if beside < low or beside >= high or points[i, 0] != points[beside, 0]:
-                    rows[count], cols[count] = points[i, 0], points[i, 1]
-                    count += 1
-            end = chain(rows, cols, count, hand, hulls, end)
-        start[v + 1] = end
-    return start, hulls[:end].copy()
+    for v in range(n_vertices):
+        part = first_part[v]
+        if behind[part] < 0:
+            for i in range(start[part], start[part + 1]):
+                hulls[end, 0], hulls[end, 1] = points[i, 0], points[i, 1]
+                end += 1
+        else:
+            for hand in (-1, 1):
+                count = 0
+                part = first_part[v]
+                while part >= 0:
+                    count = add_chain(start, points, part, hand, rows, cols, count)
+                    part = behind[part]
+                end = chain(rows, cols, count, hand, hulls, end)
+        new_start[v + 1] = end
+    return new_start, hulls[:end].copy()
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def add_chain(start, points, part, hand, rows, cols, count):
+    """Add one half of a hull to points sorted by row, of which the outermost of each row stays."""
+    low, high = start[part], start[part + 1]
+    right = low + 1  # where the rows of the right half begin anew
+    while points[right, 0] > points[right - 1, 0]:
+        right += 1
+    for i in range(right if hand > 0 else low, high if hand > 0 else right):
+        row, col = points[i, 0], points[i, 1]
+        at = count
+        while at > 0 and rows[at - 1] > row:
+            at -= 1
+        if at > 0 and rows[at - 1] == row:
+            cols[at - 1] = max(cols[at - 1], col) if hand > 0 else min(cols[at - 1], col)
+            continue
+        for k in range(count, at, -1):
+            rows[k], cols[k] = rows[k - 1], cols[k - 1]
+        rows[at], cols[at] = row, col
+        count += 1
+    return count
 
 
 @njit(cache=True, nogil=True)
@@ -101,7 +131,7 @@ def hull_distances(start, points, arcs):
     return squared
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def far_corner(cells, u, boxes, v):
     """Return the squared distance from the surviving cell of u to the far corner of v's box."""
     row, col = cells[u, 0], cells[u, 1]
@@ -110,7 +140,7 @@ def far_corner(cells, u, boxes, v):
     return rows * rows + cols * cols
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def field_within(cells, u, hull_start, hull_points, v, limit):
     """Return whether the field of v lies nearer to the surviving cell of u than the limit."""
     for i in range(hull_start[v], hull_start[v + 1]):
@@ -121,7 +151,7 @@ def field_within(cells, u, hull_start, hull_points, v, limit):
     return True
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def near_enough(u, v, hull_start, hull_points, limit):
     """Return whether every two cells of two fields lie nearer to each other than the limit."""
     for i in range(hull_start[u], hull_start[u + 1]):

@@ -174,7 +174,7 @@ def crossings_of(classes):
 
 
 @guarded
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def kinds_of_parts(classes, fine_of, kinds):
     """Fill in the kind of each cell, (rows, cols): one number for its class and its fine part.
 
@@ -188,22 +188,14 @@ def kinds_of_parts(classes, fine_of, kinds):
             kinds[row, col] = 2 * of_row[col >> 1] + 3 if of_class == 1 else of_class
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def meet(fine, other, level, most, parents, sizes, widest, limits):
     """Let two fine parts become one, or the parts that they lie in; return the first one's root.
 
-    Parameters
-    ----------
-    fine, other
-        Roots of the fine parts.
-    level, most
-        The clearance where they meet, and the greatest one.
-    parents, sizes
-        Pairs of int32 arrays, of fine parts and of parts; changed.
-    widest
-        int32, the clearance at which each was begun.
-    limits
-        `small`, `slight` and `depth`, see `divide`.
+    `fine`, `other`: roots of the fine parts; `level`, `most`: the clearance where they meet, and
+    the greatest one; `parents`, `sizes`: pairs of int32 arrays, of fine parts and of parts;
+    changed; `widest`: int32, the clearance at which each was begun; `limits`: `small`, `slight` and
+    `depth`, see `divide`.
     """
     small, slight, depth = limits
     one, two = find(parents[1], fine), find(parents[1], other)
@@ -211,14 +203,14 @@ def meet(fine, other, level, most, parents, sizes, widest, limits):
     joins_fine = is_wide or min(sizes[0][fine], sizes[0][other]) < small
     joins = joins_fine or min(sizes[1][one], sizes[1][two]) < slight
     if joins and one != two:
-        join(parents[1], sizes[1], one, two)
+        join_trees(parents[1], sizes[1], one, two)
     if joins_fine:
-        return join(parents[0], sizes[0], fine, other)
+        return join_trees(parents[0], sizes[0], fine, other)
     return fine
 
 
-@njit(cache=True, nogil=True)
-def join(parent, size, one, two):
+@njit(cache=True, nogil=True, _nrt=False)
+def join_trees(parent, size, one, two):
     """Join two trees; return the root, which is the older one."""
     first, second = min(one, two), max(one, two)
     parent[second] = first
