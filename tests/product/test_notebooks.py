@@ -76,8 +76,9 @@ def with_settings(notebook: Any, **values: Any) -> Any:
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_copy_of_a_notebook_runs_far_from_the_checkout(path: Path, tmp_path: Path) -> None:
-    copy = shutil.copy(path, tmp_path)
-    outputs = executed(nbformat.read(copy, as_version=4), start=tmp_path)
+    notebook = nbformat.read(shutil.copy(path, tmp_path), as_version=4)
+    outputs = executed(notebook, start=tmp_path)
+    assert pictures(notebook.cells[3].outputs) == 1  # what one will see comes first
     assert pictures(outputs) > 3
     assert "Warning" not in written(outputs)
 
@@ -113,7 +114,7 @@ def test_without_ompl_one_sentence_says_so_and_the_rest_runs(tmp_path: Path) -> 
     outputs = executed(nbformat.read(NEEDS_OMPL, as_version=4))
     assert written(outputs).count("not installed") == 1
     assert "Error" not in written(outputs)
-    assert pictures(outputs) == 1  # the coarse route, which needs no OMPL
+    assert pictures(outputs) == 2  # a path and the coarse route, which need no OMPL
 
 
 def test_there_are_notebooks() -> None:
