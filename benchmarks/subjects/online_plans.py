@@ -5,18 +5,22 @@ grid and the area of the change, `answer` the next query across it; `fresh` is t
 preset built of the changed map. The second table has `paper`, which takes the version of the
 on-line pyramid: CPU time of its update over that of the pyramid's own update by the same change, at
 random places; all packed arrays are compared with those of a planner made anew. All ratios are
-taken in one process.
+taken in one process. With --data, the third has the sample of the grid competition's dynamic track:
+CPU time of all updates and queries, in turn with own A*, and how many answers have another cost or
+other points than those of a planner made anew.
 """
 
 import time
 from argparse import Namespace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import hybridnav as hn
-from benchmarks.common import option, print_head, print_load, print_row, with_classes
+from benchmarks.common import DATA, option, print_head, print_load, print_row, with_classes
+from benchmarks.subjects.rescore import patched
 from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search.mesh import build_mesh
 from hybridnav.search.octile import build_jump_graph, contract_graph
@@ -116,13 +120,75 @@ def run_paper(grid: hn.OccupancyGrid) -> tuple[list[float], ...]:
     return own[4:], update[4:], answer[4:]
 
 
+Bits = tuple[float, bytes, bytes]
+"""Cost, points and cells of an answer."""
+
+
+def run_sample(preset: str, maps: list[Any]) -> list[float]:
+    """Return CPU milliseconds of updates and of queries on a sample."""
+    planner, spent = hn.HybridPlanner(maps[0][0], preset=preset), np.zeros(2)
+    for turn, (grid, ends) in enumerate(maps):
+        times = [time.process_time()]
+        if turn:
+            planner.update(grid=grid)
+        times.append(time.process_time())
+        for pair in ends:
+            planner.plan(*pair)
+        times.append(time.process_time())
+        spent += np.diff(times) * 1e3
+    return spent.tolist()
+
+
+def answers_of(preset: str, maps: list[Any], *, is_anew: bool) -> list[Bits]:
+    """Return the answers on a sample, of a planner that follows or of one for each map."""
+    found, planner = list[Bits](), hn.HybridPlanner(maps[0][0], preset=preset)
+    for grid, ends in maps:
+        if is_anew:
+            planner = hn.HybridPlanner(grid, preset=preset)
+        planner.update(grid=grid)
+        for pair in ends:
+            result = planner.plan(*pair)
+            path = result.path
+            line = (b"", b"") if path is None else (path.points.tobytes(), path.cells.tobytes())
+            found.append((result.cost, *line))
+    return found
+
+
+def sample(data: Path) -> None:
+    """Print the table of the dynamic sample."""
+    maps = []
+    for scenario in sorted((data / "gppc_dynamic").glob("*.scen")):
+        for free, batch in patched(scenario):
+            grid = hn.OccupancyGrid((~free[::-1]).astype(np.float32), robot_radius_m=0)
+            ends = np.array(batch)[:, :4].reshape(-1, 2, 2) + 0.5
+            ends[..., 1] = len(free) - ends[..., 1]
+            maps.append((grid, ends))
+    print_load()
+    print_head(
+        "dynamic sample", "updates, ms", "queries, ms", "own A* / it", "wrong", "not as anew"
+    )
+    presets = "grid-astar", "octile", "shortest"
+    turns = [{preset: run_sample(preset, maps) for preset in presets} for _ in range(4)][1:]
+    right = np.array([cost for cost, *_ in answers_of("grid-astar", maps, is_anew=True)])
+    for preset in presets:
+        spent = np.median([turn[preset] for turn in turns], axis=0)
+        ratio = np.median([sum(turn["grid-astar"]) / sum(turn[preset]) for turn in turns])
+        found, anew = (answers_of(preset, maps, is_anew=is_anew) for is_anew in (False, True))
+        costs, is_exact = np.array([cost for cost, *_ in found]), preset == "octile"
+        wrong = (abs(costs - right) > 1e-6) & (costs != right) if is_exact else costs > right + 1e-6
+        others = sum(one != other for one, other in zip(found, anew, strict=True))
+        shown = *(f"{ms:.1f}" for ms in spent), f"{ratio:.2f}"
+        print_row(preset, *shown, int(wrong.sum()), others)
+
+
 OPTIONS = [
-    option("--sides", type=int, nargs="+", default=SIDES),
+    DATA,
+    option("--sides", type=int, nargs="*", default=SIDES),
 ]
 
 
 def main(given: Namespace) -> None:
-    """Print the table."""
+    """Print the tables."""
     print_head(
         "preset", "cells", "update, ms", "answer, ms", "both, p95", "fresh, ms", "fresh / both"
     )
@@ -147,3 +213,5 @@ def main(given: Namespace) -> None:
         own, update, answer = map(np.median, run_paper(grid))
         figures = f"{own:.2f}", f"{update:.2f}", f"{update / own:.1f}", f"{answer:.2f}"
         print_row(f"{side * side:,}", *figures)
+    if given.data is not None:
+        sample(given.data)

@@ -88,6 +88,34 @@ def test_answers_after_each_change_are_optimal(preset: str, classes: Any, seed: 
             check(planner, grid, rng)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_answers_of_octile_after_changes_are_those_of_a_planner_made_anew(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    classes = (rng.random((70, 90)) > 0.05).astype(np.uint8)
+    grid = occupancy_grid(classes, resolution_m=0.5)
+    planner, maps = hn.HybridPlanner(grid, preset="octile"), [grid]
+    planner.prepare()
+    for turn in range(8):
+        grid, area = with_box(grid, rng) if turn % 4 else (maps[0], None)
+        maps.append(grid)
+        planner.update(grid=grid, changed=area)
+        fresh, cells = hn.HybridPlanner(grid, preset="octile"), np.argwhere(grid.enterable())
+        for start, goal, shut in cells[rng.integers(len(cells), size=(12, 3))]:
+            ends, line = grid.frame.points_of([start, goal]), grid.frame.points_of([start, shut])
+            one_way = hn.OneWay(lines=[line.tolist()]) if (start != shut).any() else None
+            for closed in ({}, {"blocked": {"cells": [tuple(shut)]}}, {"one_way": one_way}):
+                found, expected = (each.plan(*ends, **closed) for each in (planner, fresh))
+                assert (found.status, found.cost) == (expected.status, expected.cost)
+                assert found.lower_bound == expected.lower_bound
+                if found.path is not None:
+                    assert expected.path is not None
+                    assert found.path.cells.tobytes() == expected.path.cells.tobytes()
+                    assert found.path.points.tobytes() == expected.path.points.tobytes()
+    assert planner.prepared is None  # repaired, never built anew
+    planner.prepare()
+    assert planner.prepared is not None
+
+
 @pytest.mark.parametrize("preset", REBUILT)
 @settings(max_examples=examples(8), deadline=None)
 @given(class_grids(max_side=16), SEEDS)

@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 64_840,
-    "lines": 102_350,
-    "files": 436,
-    "code outside ext": 49_870,
+    "code": 65_240,
+    "lines": 102_805,
+    "files": 438,
+    "code outside ext": 50_280,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -29,7 +29,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 71_130,
+    "lines of tests": 71_310,
 }
 
 BUDGETS = {
@@ -45,13 +45,13 @@ BUDGETS = {
     "harness": (9453, 9),
     "maps": (5307, 6),
     "models": (2113, 6),
-    "planning": (6885, 9),
+    "planning": (6889, 9),
     "pyramid": (4445, 9),
     "reasons": (1193, 6),
     "refine": (6145, 9),
     "rooms": (5080, 9),
     "route": (1031, 6),
-    "search": (12386, 9),
+    "search": (12884, 9),
     "topology": (699, 6),
     "viz": (5405, 6),
 }
