@@ -116,9 +116,14 @@ def faults(scene: Scene, preset: str) -> Iterator[str]:
             by_cells = preset in CELLS
             best = scene.plane.cells_length(start[0], goal[0]) if by_cells else scene.lengths[i, j]
             given = [tuple(map(float, end[1][::-1])) for end in (start, goal)]
-            result = planner.plan(*given, one_way=one_way)
+            asked = f"{preset} from {start} to {goal}"
+            try:
+                result = planner.plan(*given, one_way=one_way)
+            except Exception as error:  # noqa: BLE001 - whatever it is, the attack goes on
+                yield f"{asked}: {error!r}"
+                continue
             for fault in _faults_of(scene.plane, result, (start, goal), (best, preset)):
-                yield f"{preset} from {start} to {goal}: {fault}"
+                yield f"{asked}: {fault}"
 
 
 def _faults_of(

@@ -298,3 +298,13 @@ def test_a_bend_that_is_straight_has_no_arc() -> None:
     expected = 30 * math.sqrt(2) - 2 * arc + arc * math.pi / 2
     assert cost == pytest.approx(expected, rel=1e-6)
     assert length == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_line_that_turns_back_keeps_bends_that_differ():
+    """The middle of the two bends is the goal: as one bend they would leave a line of no length."""
+    free = np.ones((4, 3), np.uint8)
+    line = np.array([[1.0, 1.5], [2.5, 2.5], [3.5, 1.5], [3.0, 2.0]])
+    points, headings, cost, length = round_bends(free, np.ones((4, 3), np.float32), line, 0.3, 1.0)
+    assert np.isfinite(headings).all()
+    assert points[[0, -1]].tolist() == line[[0, -1]].tolist()
+    assert np.hypot(2, 0.5) <= length <= cost + 1e-9

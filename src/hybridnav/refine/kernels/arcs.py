@@ -157,6 +157,8 @@ def _merged(free, factors, line, n, i, spare):
         middle = line[i].copy()
         for k in range(2):
             middle[k] = _on_grain(line[i, k] + share * (line[i + 1, k] - line[i, k]))
+        if not (_differ(a, middle) and _differ(middle, c)):  # where the line turns back
+            continue
         cost = _cost_between(free, factors, a, middle)
         if cost < least:
             cost += _cost_between(free, factors, middle, c)
