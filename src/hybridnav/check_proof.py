@@ -8,9 +8,8 @@ stated, and none costs less than the stated bound, to 1 part in 10^9 (or 10^-6 o
 ends are rounded that are no centres). The rest is decided in whole numbers.
 MAP is a MovingAI map, or a YAML file of ROS that names a PGM image of 8 bits; the proof must be
 about that map. It reads lines `KEY: VALUE # COMMENT` of YAML: VALUE is a plain text, a text in
-quotes without backslashes, or a list [x, y, yaw], which may also stand below as lines `- x`.
-What stands below other keys is skipped.
-Exits with 0 if the proof is accepted, 1 if it is rejected, 2 if a file cannot be read.
+quotes without backslashes, or a list [x, y, yaw], also below as lines `- x`. What stands below
+other keys is skipped. Exits with 0 if the proof is accepted, 1 if not, 2 if a file is not read.
 """
 
 import base64
@@ -197,8 +196,7 @@ def cost_of(walls, factors, line, is_strict):
 
 
 def follows(walls, bars, line):
-    """Return whether a chain of lines crosses no one-way line the wrong way. The cells that it may
-    be in are followed: at each point it may go round it to another."""
+    """Return whether lines obey one-way lines: the cells that they may be in are followed."""
     cells = before = {(row, col) for row, col in near(line[:1])[..., 0].T if not walls[row, col]}
     for first, last in itertools.pairwise(line):
         parts = cuts_of(first, last)
@@ -327,116 +325,127 @@ def check_king(walls, factors, proof, ends, bound):
 
 
 # STRINGS. A shortest path is a taut string: it bends at *corners* only, where one of four cells is
-# a wall, and round that wall. So a potential at start, goal and corners is enough: it must not rise
-# by more than the distance between two of them that see each other along a line that can bend round
-# both. The proof states p for some corners. Elsewhere, and where that is less, p = bound - (the
-# distance to the goal), which rises by at most the distance. So only what stated corners see is to
-# be looked at, what the start sees, and that the goal sees none whose p is too low.
-# What points see above them is swept up row by row: light from a point, between two directions,
-# falls through a run of free cells into the runs above it. A shaft of light is a point, a row of
-# cells and its height above the point, and two directions (rows, columns), all whole numbers. A
-# line that grazes walls is seen in parts, from corner to corner.
+# a wall, and round that, or beside a one-way line. So a potential at start, goal and corners is
+# enough, one in each of the four cells at a corner: p must not rise by more than the distance to
+# what one sees, nor on the way round a corner. The proof states p for some. Elsewhere, and where
+# that is less, p = bound - (the distance to the goal), which rises by at most the distance. So only
+# what the start and stated corners see is to be looked at. Light goes up and right, in four images
+# of the map, mirrored, one above the other. Row by row it falls between two directions, through a
+# run of free cells into the runs above. A row of no height lies over cells that may not be left
+# upwards; where not to the right, a run ends. A shaft of light is a point, a row, its height above
+# the point, and two directions (rows, columns), whole numbers. A line that grazes walls is seen in
+# parts, from corner to corner.
 
 
-def ranges(first, last):
-    """Return the numbers from each first to before its last, and the number of the range."""
-    count = np.maximum(last - first, 0)
+def between(first_keys, first, last_keys, last):
+    """Return the numbers from the first key at each first to the last one at last, and of which."""
+    low = np.searchsorted(first_keys, first, "left")
+    count = np.maximum(np.searchsorted(last_keys, last, "right") - low, 0)
     of = np.repeat(np.arange(len(count)), count)
-    return of, np.arange(len(of)) - np.repeat(np.cumsum(count) - count - first, count)
+    return of, np.arange(len(of)) - np.repeat(np.cumsum(count) - count - low, count)
 
 
-def sights(walls, grain, points, sectors, corners, is_near):
-    """Yield numbers of points, and of the corners (flat, sorted) that each sees above it."""
-    width, edges = walls.shape[1], np.flatnonzero(np.diff(walls.ravel())) + 1
-    begin, end = edges[::2], edges[1::2]
-    number = np.flatnonzero((sectors != 0).any(axis=0))
-    shafts = np.stack([number, points[0, number] // grain, 0 * number, *sectors[:, number]])
-    while shafts.size:
-        point, row, base, low, across_low, high, across_high = shafts
-        col, start = points[1, point], row * width * grain
-        left = start + col + across_low * base // np.maximum(low, 1)
-        right = start + col - -across_high * base // np.maximum(high, 1)
-        first = np.searchsorted(end * grain, left, "left")
-        of, run = ranges(first, np.searchsorted(begin * grain, right, "right"))
-        shafts, col = shafts[:, of], col[of]
-        point, row, base = shafts[:3]
-        top = (row + 1) * grain - points[0, point]
-        for limit, side, sign in ((shafts[3:5], begin, 1), (shafts[5:], end, -1)):
-            across = (side[run] - row * width) * grain - col
-            up = np.where(sign * across > 0, base, top)
-            cuts = sign * (across * limit[0] - limit[1] * up) > 0
-            limit[:, cuts] = up[cuts], across[cuts]
-        shafts[1:3] = row + 1, top
-        is_open = shafts[6] * shafts[3] > shafts[4] * shafts[5]
-        shafts, col = shafts[:, is_open], col[is_open]
-        point, row, top, low, across_low, high, across_high = shafts
-        left = row * width - -(col * low + across_low * top) // (low * grain)
-        right = row * width + (col * high + across_high * top) // (high * grain)
-        first = np.searchsorted(corners, left, "left")
-        of, seen = ranges(first, np.searchsorted(corners, right, "right"))
-        yield point[of], seen
-        left, right = col + across_low * top / low, col + across_high * top / high
-        shafts = shafts[:, is_near(point, top / grain, left / grain, right / grain)]
+def strings_in(walls, bars, ends, bound):
+    """Return start, goal and the corners that a path below the bound may pass, p of them where none
+    is stated, flat over (4, n), and what yields lit ones with what each of them sees."""
+    marks = walls + np.uint8(8) * bars.any(axis=0)
+    four = sum(marks[r : r - 1 or None, c : c - 1 or None] for r in (0, 1) for c in (0, 1))
+    nodes = np.concatenate([ends, np.argwhere((four == 1) | (four > 7)) + 1])
+    grain = 2 ** (30 - max(walls.shape).bit_length())  # products of two numbers fit into 62 bits
+    flat, far = np.rint(nodes * grain).astype(np.int64), [np.hypot(*(nodes - p).T) for p in ends]
+    kept = (flat[:, None] != flat[:2]).any(axis=2).all(axis=1) & (far[0] + far[1] < bound)
+    kept[:2] = True
+    nodes, (y, x), plain = nodes[kept], flat[kept].T, np.tile(bound - far[1][kept], 4)
+    size, q, (height, width) = len(nodes), np.arange(4)[:, None], np.multiply(walls.shape, grain)
+    at = nodes[:, 0].astype(int) - q // 2, nodes[:, 1].astype(int) - q % 2  # the four cells
+    free = ~walls[at]
+    taut = free & (free[::-1] | (four[at[0][3], at[1][3]] > 7)) | (np.arange(size) == 0)
+    # The rows of the images: 2 is mirrored up and down, 1 left and right. Ends cut rows.
+    tops, rows, cuts = [], [], []
+    for k in range(4):
+        flip = np.s_[:: 1 - (k & 2), :: 1 - 2 * (k & 1)]
+        wall, right, up = (one[flip] for one in (walls, bars[2 * (k & 1)], bars[1 + (k & 2)]))
+        top = np.union1d(np.arange(grain, height + 1, grain), abs(height * (k // 2) - y[:2]))
+        row, over = (top - 1) // grain, np.flatnonzero(up.any(axis=1))
+        place = np.searchsorted(top, (over + 1) * grain, "right")
+        tops.append(np.insert(top, place, (over + 1) * grain) + k * height)
+        rows.append(np.insert(wall[row], place, (wall | up)[over], axis=0))
+        cuts.append(np.insert(right[row], place, False, axis=0))
+    tops, rows, cuts = map(np.concatenate, (tops, rows, cuts))
+    cuts = np.flatnonzero(cuts & ~rows & ~np.roll(rows, -1, 1)) + 1
+    edges = np.flatnonzero(np.diff(rows.ravel())) + 1
+    begin, end = (np.sort(np.concatenate([edges[k::2], cuts])) * grain for k in (0, 1))
+    points = [abs(height * (q // 2) - y) + height * q, abs(width * (q % 2) - x)]
+    points = np.array(points).reshape(2, -1)
+    key = np.searchsorted(tops, points[0], "left") * width + points[1]
+    order = np.argsort(key, kind="stable")
+
+    def seen(one, first, last):
+        """Return points and what each sees between two keys, in the cell where light comes to."""
+        of, number = between(key[order], first, key[order], last)
+        one, two = one[of], order[number]
+        turn = np.array([2, 1]) @ (points[:, one] != points[:, two])
+        return one, (two // size ^ turn) * size + two % size
+
+    def in_sight(p, lit):
+        for n, way in enumerate((2, 3, 0, 3, 2, 1, 0, 1)):  # round a corner, from cell to cell
+            k, turn = n // 2, 1 + n % 2
+            one = np.flatnonzero(free[k] & free[k ^ turn] & ~bars[way][at[0][k], at[1][k]])
+            yield one + k * size, one + (k ^ turn) * size
+        point = np.flatnonzero(lit)
+        row, none = np.searchsorted(tops, points[0, point], "right"), np.zeros_like(point)
+        shafts = np.stack([point, row, none, none + 1, none, none, none + 1])
+        while shafts.size:
+            point, row, base, low, across_low, high, across_high = shafts
+            start = row * width + points[1, point]
+            left = start + across_low * base // np.maximum(low, 1)
+            right = start - -across_high * base // np.maximum(high, 1)
+            of, run = between(end, left, begin, right)
+            shafts, start = shafts[:, of], start[of]
+            point, row, base = shafts[:3]
+            if not base.any():  # along its row, as far as a run beside it; else where strings bend
+                yield seen(point, key[point] + 1, key[point] + end[run] - start)
+                shafts[3:, ~taut.ravel()[point]] = 0
+            top = tops[row] - points[0, point]
+            for limit, side, sign in ((shafts[3:5], begin, 1), (shafts[5:], end, -1)):
+                across = side[run] - start
+                up = np.where(sign * across > 0, base, top)
+                cuts = sign * (across * limit[0] - limit[1] * up) > 0
+                limit[:, cuts] = up[cuts], across[cuts]
+            shafts[1:3] = row + 1, top
+            is_open = shafts[6] * shafts[3] > shafts[4] * shafts[5]
+            shafts, start = shafts[:, is_open], start[is_open]
+            point, row, top, low, across_low, high, across_high = shafts
+            yield seen(point, start - -across_low * top // low, start + across_high * top // high)
+            # It goes on where a path over the lit part of the row can be shorter than the bound.
+            ahead, across = points[:, point - point % size + 1] - points[:, point]
+            ahead, sides = abs(ahead - top), (across_low * top / low, across_high * top / high)
+            best = np.clip(across * top / (ahead + top), *sides)
+            length = np.hypot(top, best) + np.hypot(ahead, best - across)
+            shafts = shafts[:, length < (bound - p[point]) * grain]
+
+    return nodes, plain, in_sight
 
 
-def check_strings(walls, proof, ends, bound):
+def check_strings(walls, bars, proof, ends, bound):
     """Check a potential at corners that bounds the lengths of all lines."""
     spare = (bound - abs(ends[1] - ends[0])) / 2 + 3  # nothing beyond is near enough
     low = np.maximum(ends.min(axis=0) - spare, 0).astype(int)
-    high = (ends.max(axis=0) + spare).astype(int)
-    walls, ends = walls[low[0] : high[0], low[1] : high[1]].copy(), ends - low
+    part = tuple(map(slice, low, (ends.max(axis=0) + spare).astype(int)))
+    walls, bars, ends = walls[part].copy(), bars[(np.s_[::2], *part)], ends - low
     walls[[0, -1]] = walls[:, [0, -1]] = True
-    heights = np.full(walls.shape, np.inf)
-    for row, col, height in proof["heights"]:
-        heights[row + 1 - low[0], col + 1 - low[1]] = height
+    heights = np.full((4, *walls.shape), np.inf)
+    for row, col, *height in proof["heights"]:
+        heights[:, row + 1 - low[0], col + 1 - low[1]] = height
     if len(walls) > len(walls[0]):  # there are fewer columns than rows to sweep over
-        walls, ends, heights = walls.T, ends[:, ::-1], heights.T
-    four = walls[:-1].astype(np.uint8) + walls[1:]
-    corners = np.argwhere(four[:, :-1] + four[:, 1:] == 1) + 1
-    to_start, to_goal = (np.hypot(*(corners - end).T) for end in ends)
-    corners, to_goal = (one[to_start + to_goal < bound] for one in (corners, to_goal))
-    # The nodes are start, goal and corners. Above the map its mirror image is laid, with all nodes
-    # again: what they see below them in the one is above them in the other.
-    p = np.concatenate([[0, bound], bound - to_goal])
-    stated = np.concatenate([[-np.inf] * 2, heights[tuple(corners.T)]])
-    is_lower, p[2:] = stated < p, np.fmin(p, stated)[2:]
-    size, width, both = len(p), walls.shape[1], np.concatenate([walls, walls[::-1]])
-    node, places = np.arange(2 * size) % size, np.concatenate([ends, corners]).T
-    places = np.hstack([places, [[2 * len(walls)], [0]] + [[-1], [1]] * places])
-    grain = 2 ** (30 - max(both.shape).bit_length())  # products of two numbers fit into 62 bits
-    points, p = np.rint(places * grain).astype(np.int64), p[node]
-    row, col = points // grain
-    bend = np.where(both[row, col - 1] | both[row - 1, col], 1, -1) * (node > 1)  # right or left
-    sectors = np.stack([bend > 0, (bend > 0) - 1, bend < 0, bend >= 0]) * is_lower[node]
-
-    def compare(one, two, is_bend):
-        rise = np.where(node[one] == 1, p[one] - p[two], p[two] - p[one])
-        rise -= np.hypot(*(places[:, two] - places[:, one]))
-        need((rise[is_bend] < 1e-9).all(), "p rises too much in sight")
-
-    def is_near(point, up, left, right):
-        """Return whether a path over a lit part of a row can be shorter than the bound."""
-        is_goal = node[point] == 1
-        other = np.where(is_goal, point - 1, point - node[point] + 1)
-        (down, across), (far_down, far_across) = places[:, point], places[:, other]
-        ahead = abs(down + up - far_down)
-        best = np.clip((across * ahead + far_across * up) / (ahead + up), left, right)
-        length = np.hypot(up, best - across) + np.hypot(ahead, best - far_across)
-        return length < bound - np.where(is_goal, 0, p[point])
-
-    order = np.argsort(np.where(node > 1, row * width + col, -1), kind="stable")[4:]
-    for one, seen in sights(both, grain, points, sectors, (row * width + col)[order], is_near):
-        two = order[seen]
-        compare(one, two, bend[two] * (points[1, two] - points[1, one]) >= 0)
-    # Along a row of corners, each sees the next one where a row of cells beside them is free.
-    order = np.lexsort(points[::-1, :size])
-    one, two, count = order[:-1], order[1:], np.cumsum(walls)
-    low, high = points[1, one] // grain - 1, -(-points[1, two] // grain) - 1
-    for row in (points[0, one] // grain, -(-points[0, one] // grain) - 1):
-        is_free = count[row * width + low] == count[row * width + high]
-        is_free &= points[0, one] == points[0, two]
-        compare(one, two, is_free)
-        compare(two, one, is_free)
+        walls, ends, bars = walls.T, ends[:, ::-1], bars[[1, 0, 3, 2]].transpose(0, 2, 1)
+        heights = heights[[0, 2, 1, 3]].transpose(0, 2, 1)
+    nodes, plain, in_sight = strings_in(walls, bars, ends, bound)
+    size, (row, col) = len(nodes), nodes[2:].astype(int).T
+    p = np.fmin(np.hstack([[[0, bound]] * 4, heights[:, row, col]]).ravel(), plain)
+    for one, two in in_sight(p, p < plain):
+        far = np.hypot(*(nodes[two % size] - nodes[one % size]).T)
+        need((p[two] - p[one] < far + 1e-9).all(), "p rises too much in sight")
 
 
 def check(measured, frame, proof):
@@ -483,12 +492,11 @@ def check_path(walls, factors, bars, proof, ends):
         line = line[is_turn] + 0.5
     else:
         line = np.array(proof["line"], float) + 1
-    inside = (line > 1 - 1e-7).all() and (line < walls.shape).all()  # as `near` rounds
-    need(inside, "the path leaves the map")
+    need((line > 1 - 1e-7).all() and (line < walls.shape).all(), "the path leaves the map")
     steps = np.hypot(*np.diff(line, axis=0).T)
     need(len(line) <= 10**5 and (steps > 1e-5).all(), "steps too many or too short")
-    within = (abs(line[[0, -1]] - ends) <= 0.5 * is_cells + 1e-6).all()  # anywhere in a cell
-    need(within, "the ends are not start and goal")
+    away = abs(line[[0, -1]] - ends) - 0.5 * is_cells  # anywhere in a cell
+    need((away <= 1e-6).all(), "the ends are not start and goal")
     cost = cost_of(walls, factors, line, is_cells) * proof["side_m"]
     need(cost < math.inf, "the path meets a wall")
     need(not bars.any() or follows(walls, bars, line), "the path crosses a side the wrong way")
@@ -497,12 +505,10 @@ def check_path(walls, factors, bars, proof, ends):
     need(0 <= proof["bound"] <= cost + spare, "the bound is above the cost")
     if is_cells:
         check_cells(walls, factors, proof, line[[0, -1]], bound, bars)
+    elif bound > math.dist(*line[[0, -1]]) and proof["costs"] is None:
+        check_strings(walls, bars, proof, line[[0, -1]], bound)
     elif bound > math.dist(*line[[0, -1]]):  # as no factor is below 1
-        if proof["costs"] is None:
-            need(cost_of(walls, factors, line[[0, -1]], False) == math.inf, "a line is shorter")
-            check_strings(walls, proof, line[[0, -1]], bound)
-        else:
-            check_king(walls, factors, proof, line[[0, -1]], bound)
+        check_king(walls, factors, proof, line[[0, -1]], bound)
 
 
 def main(arguments):

@@ -30,6 +30,7 @@ def test_a_diagonal_beside_a_blocked_cell_goes_round_its_corner_by_the_other():
     [
         470,  # an end at a corner of cells, whose cell lies behind it
         684,  # a line along a side, beside which the other cell was listed
+        718168,  # a line that ends in another cell beside its end, far from all sides
         703976,  # a line back to a corner of cells through which it had come
     ],
 )

@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_240,
-    "lines": 102_805,
+    "code": 65_280,
+    "lines": 102_850,
     "files": 438,
-    "code outside ext": 50_280,
+    "code outside ext": 50_325,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -29,7 +29,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 71_310,
+    "lines of tests": 71_380,
 }
 
 BUDGETS = {
@@ -51,7 +51,7 @@ BUDGETS = {
     "refine": (6145, 9),
     "rooms": (5080, 9),
     "route": (1031, 6),
-    "search": (12884, 9),
+    "search": (12925, 9),
     "topology": (699, 6),
     "viz": (5405, 6),
 }

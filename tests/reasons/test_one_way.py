@@ -11,12 +11,13 @@ import hybridnav as hn
 from benchmarks.subjects.proofs import frame_of, is_accepted
 from hybridnav import check_proof
 from tests.one_way import Scene, planner_of, random_scene
+from tests.reasons.test_proofs import forged
 from tests.strategies import examples
 
 # Random lines may lie between blocked cells alone.
 pytestmark = pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
-PRESETS = "shortest", "octile", "grid-astar", "robot"
-CELLS = "octile", "grid-astar"
+PRESETS = "shortest", "octile", "grid-astar", "paper", "robot"
+CELLS = "octile", "grid-astar", "paper"
 WARD = Scene(np.ones((4, 6), bool), np.array([(1, c, 2, c) for c in range(6)]), [])
 """A line across the map, crossed upwards."""
 BELOW, ABOVE = (0.5, 0.5), (0.5, 3.5)
@@ -39,31 +40,64 @@ def plans(scene, preset):
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_proofs_of_directed_plans_are_accepted_and_bound_the_optimum(preset):
-    kinds = dict.fromkeys(("path", "no path", "dropped", "turned"), 0)
+    kinds = dict.fromkeys(("path", "no path", "dropped", "turned", "wrong"), 0)
     for seed in range(examples(80, 800)):
         scene = random_scene(seed, n_ends=2)
-        for planner, result, best in plans(scene, preset) if scene else ():
+        if scene is None:
+            continue
+        for planner, result, best in plans(scene, preset):
             grid, proof = planner.grid, json.loads(json.dumps(hn.prove(result), allow_nan=False))
             said = check_proof.check(grid.measured, frame_of(grid), proof)
-            assert said.startswith("path" if best < math.inf else "no path")
-            kinds["path" if best < math.inf else "no path"] += 1
-            if best < math.inf:
+            has_path = best < math.inf
+            assert said.startswith("path" if has_path else "no path")
+            kinds["path" if has_path else "no path"] += 1
+            if has_path:
                 # The costs of `robot` are at least the lengths that the oracle knows.
                 assert proof["bound"] <= (result.cost if preset == "robot" else best) + 1e-9
-                if preset in CELLS:
+                on_line = any(at % 1 == 0 for end in (result.start, result.goal) for at in end)
+                # An end on a line may lie in any cell beside it.
+                if preset in CELLS or (preset == "shortest" and not on_line):
                     assert proof["bound"] == pytest.approx(best, abs=1e-9)
             # Without directions another path, or a path at all, may be there.
             free = planner.plan(result.start, result.goal)
-            is_better = preset in CELLS and free.cost < best - 1e-6
-            if free.solved and (best == math.inf or is_better):
+            is_better = has_path and free.cost < proof["bound"] - 1e-6
+            if is_better or (free.solved and not has_path):
                 kinds["dropped"] += 1
                 assert not is_accepted(grid, {**proof, "one_way": []})
             # The path of the map without directions crosses a side the wrong way.
-            if free.solved and is_better:
-                kinds["turned"] += 1
+            if is_better:
+                kinds["wrong"] += 1
                 wrong = hn.prove(free) | {"one_way": proof["one_way"], "bound": 0.0}
                 assert not is_accepted(grid, wrong)
-    assert min(kinds["path"], kinds["no path"], kinds["dropped"]) > 0, kinds
+            # With the lines turned it states another problem, and is true of that.
+            turned = {**proof, "one_way": [line[::-1] for line in proof["one_way"]]}
+            if is_accepted(grid, turned):
+                kinds["turned"] += 1
+                back = Scene(scene.free, scene.sides[:, [2, 3, 0, 1]], scene.ends)
+                ends = result.start, result.goal
+                other = planner.plan(*ends, one_way=hn.OneWay(sides=back.sides))
+                assert other.cost >= proof["bound"] - 1e-9 if has_path else not other.solved
+    assert min(kinds["path"], kinds["no path"], kinds["dropped"], kinds["turned"]) > 0, kinds
+    assert kinds["wrong"] > 0 or preset == "robot", kinds
+
+
+def test_no_heights_prove_a_length_that_is_too_high_past_lines():
+    rng, n_forged = np.random.default_rng(64), 0
+    for seed in range(examples(200, 3_000)):
+        scene = random_scene(seed, n_ends=2)
+        if scene is None:
+            continue
+        for planner, result, best in plans(scene, "shortest"):
+            if not 0 < best < math.inf:
+                continue
+            proof = forged(hn.prove(result), planner.grid, rng)
+            walls = np.pad(~scene.free, 1, constant_values=True)
+            bars = check_proof.bars_of(walls.shape, proof)
+            ends = np.array(proof["line"])[[0, -1]]
+            n_forged += 1
+            with pytest.raises(check_proof.Rejected, match="p rises too much"):
+                check_proof.check_strings(walls, bars, proof, ends + 1, proof["bound"])
+    assert n_forged > 50
 
 
 @pytest.mark.parametrize("preset", PRESETS)

@@ -126,7 +126,8 @@ def forged(proof, grid, rng):
     longer = [*proof["line"][:-1], *bend, goal.tolist(), back.tolist(), goal.tolist()]
     bound = proof["bound"] / grid.resolution_m + more
     reach = bound * float(rng.choice([1, 1, 1.2]))
-    heights = strings_near(grid.enterable(), np.array([start, goal]), reach)
+    ends = np.array([start, goal])
+    heights, _ = strings_near(grid.enterable(), ends, reach, proof["one_way"])
     for _ in range(int(rng.integers(4))):
         if heights:
             n = int(rng.integers(len(heights)))
@@ -136,14 +137,14 @@ def forged(proof, grid, rng):
             elif kind == 1:
                 heights[n][int(rng.integers(2))] += int(rng.choice([-1, 1]))
             elif kind == 2:
-                heights[n][2] += float(rng.choice([more, -more, 1e9, -1e9, np.nan]))
+                heights[n][-1] += float(rng.choice([more, -more, 1e9, -1e9, np.nan]))
             elif kind == 3:
                 heights = heights[:n]
             elif kind == 4:
-                heights.append([*heights[n][:2], heights[n][2] + more])
+                heights.append([*heights[n][:-1], heights[n][-1] + more])
             else:
                 share = float(rng.choice([1 + more / bound, bound]))
-                heights = [[row, col, share * p] for row, col, p in heights]
+                heights = [[*at[:2], *(share * p for p in at[2:])] for at in heights]
     metres = bound * grid.resolution_m
     return {**proof, "line": longer, "heights": heights, "bound": metres, "cost": metres}
 

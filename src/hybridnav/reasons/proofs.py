@@ -22,7 +22,6 @@ from hybridnav.planning import PlanResult
 from hybridnav.planning.costs import PlannerCosts
 from hybridnav.search.directed import DirectedSides
 from hybridnav.search.found import ClosedCells
-from hybridnav.search.mesh import MeshSearch, build_mesh, shortest_paths
 from hybridnav.search.mesh.slits import lines_of
 from hybridnav.search.proofs import (
     grid_near,
@@ -134,7 +133,7 @@ class _Problem:
         points = np.array([self.result.start[:2], self.result.goal[:2]])
         return self.grid.frame.positions_of(points)
 
-    @property
+    @cached_property
     def stated(self) -> dict[str, Any]:
         """The map, the robot, what is closed, and the two ends."""
         grid, layer, costs = self.grid, self.costs.layer, None
@@ -226,20 +225,15 @@ def _line(problem: _Problem) -> dict[str, Any]:
     result = problem.result
     assert result.path is not None  # noqa: S101 - it is solved
     line = _distinct(problem.grid.frame.positions_of(result.path.points))
-    bound = result.lower_bound
-    if problem.one_way is not None:
-        # The bound of the map without directions, which holds with them too.
-        cells = result.path.cells[:1], result.path.cells[-1:]
-        search = MeshSearch(build_mesh(problem.free))
-        least = shortest_paths(search, cells, (line[:1], line[-1:]))
-        bound = min(bound, float(least.lower_bound_cells[0]) * problem.grid.resolution_m)
-    near = bound / problem.grid.resolution_m * (1 - 1e-9)
+    per_cell = problem.grid.resolution_m
+    near, lines = result.lower_bound / per_cell * (1 - 1e-9), problem.stated["one_way"]
+    heights, bound = strings_near(problem.free, line[[0, -1]], near, lines)
     return {
         "kind": "line",
         "cost": result.cost,
-        "bound": bound,
+        "bound": result.lower_bound if bound == near else bound * per_cell,
         "line": line.tolist(),
-        "heights": strings_near(problem.free, line[[0, -1]], near),
+        "heights": heights,
     }
 
 

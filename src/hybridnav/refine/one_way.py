@@ -92,7 +92,7 @@ def _sides_at(one_way: DirectedSides, cell: Cell) -> IntArray:
     apart = np.abs(one_way.sides.reshape(-1, 2, 2) - np.array(cell)).max(axis=2)
     near = np.flatnonzero((apart <= 1).any(axis=1))
     parts = [places for places in one_way.parts.values() if np.isin(near, places).any()]
-    return one_way.sides[np.concatenate(parts)]
+    return one_way.sides[np.concatenate([near[:0], *parts])]  # none at a mere end of a line
 
 
 def _unused(sides: IntArray, cells: LongArray, cols: int) -> LongArray:

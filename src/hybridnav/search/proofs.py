@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.moves import FAR
+from hybridnav._base.trig import hypots
 from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.check_proof import (
     COS,
@@ -17,12 +18,19 @@ from hybridnav.check_proof import (
     PLAIN,
     SIN,
     TILTED,
+    bars_of,
     costs_of_cells,
     costs_of_corners,
+    strings_in,
 )
 from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
 from hybridnav.search.lattice import slopes_of
+
+_ROUNDS = 8
+"""Parts of a path's length in which distances settle, one after the other."""
+_LESS = 1e-11
+"""Cells by which a distance shrinks, beyond rounding."""
 
 
 class Grid(NamedTuple):
@@ -215,21 +223,62 @@ def _chain_round(area: BoolArray, goal: tuple[int, int]) -> LongArray:
     return chain[is_new]
 
 
-def strings_near(free: BoolArray, ends: FloatArray, bound_cells: float) -> list[Any]:
+def strings_near(
+    free: BoolArray, ends: FloatArray, bound_cells: float, one_way: list[Any]
+) -> tuple[list[Any], float]:
     """Return the corners over which a path may be shorter than a bound, as far as the straight way
     to the goal tells.
 
     `free`: bool (rows, cols), cells that may be entered; `ends`: float64 (2, 2), positions (row,
-    col) of start and goal in grid units; `bound_cells`: length in cells. Returns rows of (row, col,
-    distance from the start in cells).
+    col) of start and goal in grid units; `bound_cells`: length in cells; `one_way`: lines as a
+    proof states them. Returns rows of (row, col, distance from the start in cells); with lines, of
+    four distances where those to the cells at the corner differ. And the bound: that of paths that
+    may begin and end in any cell at an end on a line.
     """
     cells = np.floor(ends).astype(np.int64)
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)
     walls = np.pad(~free[low[0] : high[0], low[1] : high[1]], 1, constant_values=True)
     inside = ends - low + 1
-    grain = 2 ** (30 - max(walls.shape).bit_length())
-    points = np.rint(inside * grain).astype(np.int64)
-    found = strings_of(walls, grain, inside, points, bound_cells).tolist()
-    return [
-        [int(row) + int(low[0]), int(col) + int(low[1]), round(far, 10)] for row, col, far in found
+    if one_way:
+        bars = bars_of(np.add(free.shape, 2), {"one_way": one_way})[::2]
+        part = np.s_[:, low[0] : high[0] + 2, low[1] : high[1] + 2]
+        found, bound_cells = _directed_strings(walls, bars[part], inside, bound_cells)
+    else:
+        grain = 2 ** (30 - max(walls.shape).bit_length())
+        points = np.rint(inside * grain).astype(np.int64)
+        found = strings_of(walls, grain, inside, points, bound_cells).tolist()
+    heights = [
+        [int(row) + int(low[0]), int(col) + int(low[1]), *(round(far, 10) for far in lengths)]
+        for row, col, *lengths in found
     ]
+    return heights, bound_cells
+
+
+def _directed_strings(
+    walls: BoolArray, bars: BoolArray, ends: FloatArray, bound_cells: float
+) -> tuple[list[Any], float]:
+    """Return the rows and the bound of `strings_near`: distances shrink along what sees each other,
+    until none does."""
+    nodes, plain, in_sight = strings_in(walls, bars, ends, bound_cells)
+    size, length = len(nodes), plain.copy()
+    length[::size] = 0.0
+    waiting = length < plain
+    while waiting.any():
+        # The nearest first, so that few are looked from twice.
+        lit = waiting & (length <= length[waiting].min() + bound_cells / _ROUNDS)
+        before = length.copy()
+        for one, two in in_sight(before, lit):
+            far = hypots(*(nodes[two % size] - nodes[one % size]).T)
+            np.minimum.at(length, two, before[one] + far)
+        waiting = waiting & ~lit | (length < before - _LESS)
+    bound = float(length[1::size].min())
+    corners, q = nodes[2:].astype(np.int64), np.arange(4)
+    stated = (length < plain - _LESS).reshape(4, -1).any(axis=0)[2:]
+    lengths = length.reshape(4, -1)[:, 2:].T
+    is_wall = walls[corners[:, :1] - q // 2, corners[:, 1:] - q % 2]
+    lengths = np.where(is_wall, lengths.min(axis=1, keepdims=True), lengths)
+    rows = [
+        [*at, *(each if max(each) > min(each) else each[:1])]
+        for at, each in zip((corners - 1)[stated].tolist(), lengths[stated].tolist(), strict=True)
+    ]
+    return rows, bound
