@@ -21,7 +21,7 @@ ONWARD, BACKWARD = 16, 32
 the head, and if it is one from the head to the tail."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def class_of(rows, cols):
     """Return the class of a leg by its offsets, at least one of which is not 0."""
     if rows == 0:
@@ -74,7 +74,7 @@ def legs_that_follow():
     return table
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def row_col_kind(place):
     """Return the parts of a corner cell's place: row, column, blocked corners."""
     return (
@@ -153,7 +153,7 @@ def join(tables, cell, found, is_directed):
     return n_found
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def step_of(k, width):
     """Return the step from a flat cell to its neighbour in a direction."""
     if k == 0:
@@ -165,7 +165,7 @@ def step_of(k, width):
     return k - 6 - width
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def limit_of(seen):
     """Return the distance along a side from which no cell is the next corner cell any more.
 
@@ -174,7 +174,7 @@ def limit_of(seen):
     return seen if seen > 0 else 1 - seen
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def is_direct(tables, cell, goal):
     """Return whether the leg from a cell to another one, diagonal first, is free."""
     width = tables[3]
@@ -184,18 +184,18 @@ def is_direct(tables, cell, goal):
     at = cell
     if diagonal > 0:
         k = (1 if cols > 0 else 3) if rows > 0 else (7 if cols > 0 else 5)
-        if not _is_free(tables, at, k, diagonal):
+        if not _is_clear(tables, at, k, diagonal):
             return False
         at += diagonal * step_of(k, width)
     if straight > 0:
         along_col, along_row = (2 if rows > 0 else 6), (0 if cols > 0 else 4)
         k = along_col if abs(rows) > abs(cols) else along_row
-        return _is_free(tables, at, k, straight)
+        return _is_clear(tables, at, k, straight)
     return True
 
 
-@njit(cache=True, nogil=True)
-def _is_free(tables, at, k, distance):
+@njit(cache=True, nogil=True, _nrt=False)
+def _is_clear(tables, at, k, distance):
     """Return whether `distance` moves in a direction are legal."""
     index, ahead, _, width = tables
     step = step_of(k, width)

@@ -27,22 +27,22 @@ WORD = 64
 """Cells of a word of the index, and rows of distances that one with a freed cell gets."""
 
 
-@njit(cache=True, nogil=True)
-def _is_free(index, cell):
+@njit(cache=True, nogil=True, _nrt=False)
+def _is_open(index, cell):
     """Return whether a cell is free."""
     return index[cell >> 6, 0] >> (cell & 63) & 1 == 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _kind(index, width, cell):
     """Return the corners of a cell that are blocked while both cells beside them are free; 0 for a
     blocked cell."""
     kind = 0
-    if _is_free(index, cell):
+    if _is_open(index, cell):
         for k in range(1, 8, 2):
             one, two = cell + step_of(k - 1, width), cell + step_of(k + 1 & 7, width)
-            if _is_free(index, one) and _is_free(index, two):
-                kind |= (0 if _is_free(index, cell + step_of(k, width)) else 1) << k // 2
+            if _is_open(index, one) and _is_open(index, two):
+                kind |= (0 if _is_open(index, cell + step_of(k, width)) else 1) << k // 2
     return kind
 
 
@@ -140,9 +140,9 @@ def _follow(tables, zone, span, k, noted, n):
             while is_next:
                 # As in `look_ahead`.
                 now = 0
-                if _is_free(index, cell + step) and (
+                if _is_open(index, cell + step) and (
                     k & 1 == 0
-                    or (_is_free(index, cell + steps[0]) and _is_free(index, cell + steps[1]))
+                    or (_is_open(index, cell + steps[0]) and _is_open(index, cell + steps[1]))
                 ):
                     at = number_of(index, cell + step)
                     stops = is_corner(index, cell + step)
@@ -161,11 +161,11 @@ def _follow(tables, zone, span, k, noted, n):
                 noted[n, 0], noted[n, 1] = cell, k + sign
                 n += 1
                 cell -= step
-                is_next = _is_free(index, cell) and not _is_in(zone, cell)
+                is_next = _is_open(index, cell) and not _is_in(zone, cell)
     return noted, n
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _is_in(zone, cell):
     """Return whether a cell is marked."""
     return zone[cell >> 6] >> (cell & 63) & 1 == 1
@@ -233,20 +233,20 @@ def follow_cells(index, ahead, width, differ):
     return marked, n_corners
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _put(zone, span, cell):
     """Mark a cell, and keep the first word with a mark, and the last."""
     _mark(zone, cell)
     span[0], span[1] = min(span[0], cell >> 6), max(span[1], cell >> 6)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _mark(marked, cell):
     """Mark a cell."""
     marked[cell >> 6] |= np.int64(1) << (cell & 63)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _mark_behind(tables, rays, k, marked):
     """Mark the corner cells from which rays along a diagonal reach some cells.
 
@@ -300,7 +300,7 @@ def _corners_now(index, width, places):
     return now, before, after
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _holds(values, low, high, value):
     """Return whether a part of an array holds a value."""
     for at in range(low, high):  # noqa: SIM110 - a kernel
@@ -309,7 +309,7 @@ def _holds(values, low, high, value):
     return False
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _finds(tables, cell, goal):
     """Return whether `join` finds a corner cell from another one."""
     index, ahead, _, width = tables
@@ -334,7 +334,7 @@ def _finds(tables, cell, goal):
         limit = min(limit, limit_of(beside))
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _cell_of(place, width):
     """Return the flat cell of a corner cell by its place."""
     row, col, _ = row_col_kind(place)
@@ -433,7 +433,7 @@ def link_again(tables, places, first, arcs, marked):
     return now, count, made[:m]
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _had(first, arcs, after, old, other):
     """Return whether there was an arc between corner cells, by the number of the one before, and
     that of the other now."""

@@ -13,7 +13,7 @@ BLOCKED = -1
 """Number of cells that are not free."""
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def n_bits(word):
     """Count the bits that are set in an int64."""
     pairs = word - (word >> 1 & 0x5555555555555555)
@@ -21,20 +21,20 @@ def n_bits(word):
     return ((fours + (fours >> 4)) & 0x0F0F0F0F0F0F0F0F) * 0x0101010101010101 >> 56
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def number_of(index, cell):
     """Return the number of a free cell; see `number_cells` for the index."""
     word, before = cell >> 6, (np.int64(1) << (cell & 63)) - 1
     return (index[word, 2] >> 32) + n_bits(index[word, 0] & before)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def is_corner(index, cell):
     """Return whether a cell is a corner cell."""
     return index[cell >> 6, 1] >> (cell & 63) & 1 == 1
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def corner_at(index, cell):
     """Return the number of a corner cell among these, in the order of rows."""
     word, before = cell >> 6, (np.int64(1) << (cell & 63)) - 1
@@ -85,7 +85,7 @@ def number_cells(free):
     return number, corners, kinds, index
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def _kind(number, width, cell):
     """Return the corners of a free cell that are blocked while both cells beside them are free."""
     east, north = number[cell + 1] != BLOCKED, number[cell + width] != BLOCKED
