@@ -27,10 +27,8 @@ from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
 from hybridnav.search.lattice import slopes_of
 
-_ROUNDS = 8
-"""Parts of a path's length in which distances settle, one after the other."""
-_LESS = 1e-11
-"""Cells by which a distance shrinks, beyond rounding."""
+_ROUNDS, _LESS = 8, 1e-11
+"""Parts of a length in which distances settle in turn; cells by which one shrinks at least."""
 
 
 class Grid(NamedTuple):
@@ -231,9 +229,8 @@ def strings_near(
 
     `free`: bool (rows, cols), cells that may be entered; `ends`: float64 (2, 2), positions (row,
     col) of start and goal in grid units; `bound_cells`: length in cells; `one_way`: lines as a
-    proof states them. Returns rows of (row, col, distance from the start in cells); with lines, of
-    four distances where those to the cells at the corner differ. And the bound: that of paths that
-    may begin and end in any cell at an end on a line.
+    proof states them. Returns rows of (row, col, distance from the start in cells), of four where
+    the cells at a corner differ; and the bound for paths from and to any cell at an end on a line.
     """
     cells = np.floor(ends).astype(np.int64)
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)
@@ -260,9 +257,8 @@ def _directed_strings(
     """Return the rows and the bound of `strings_near`: distances shrink along what sees each other,
     until none does."""
     nodes, plain, in_sight = strings_in(walls, bars, ends, bound_cells)
-    size, length = len(nodes), plain.copy()
-    length[::size] = 0.0
-    waiting = length < plain
+    size, waiting = len(nodes), np.arange(len(plain)) % len(nodes) == 0
+    length = np.where(waiting, 0.0, plain)
     while waiting.any():
         # The nearest first, so that few are looked from twice.
         lit = waiting & (length <= length[waiting].min() + bound_cells / _ROUNDS)
@@ -271,7 +267,6 @@ def _directed_strings(
             far = hypots(*(nodes[two % size] - nodes[one % size]).T)
             np.minimum.at(length, two, before[one] + far)
         waiting = waiting & ~lit | (length < before - _LESS)
-    bound = float(length[1::size].min())
     corners, q = nodes[2:].astype(np.int64), np.arange(4)
     stated = (length < plain - _LESS).reshape(4, -1).any(axis=0)[2:]
     lengths = length.reshape(4, -1)[:, 2:].T
@@ -281,4 +276,4 @@ def _directed_strings(
         [*at, *(each if max(each) > min(each) else each[:1])]
         for at, each in zip((corners - 1)[stated].tolist(), lengths[stated].tolist(), strict=True)
     ]
-    return rows, bound
+    return rows, float(length[1::size].min())
