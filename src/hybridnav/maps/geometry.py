@@ -4,6 +4,8 @@ numpy is slower.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from hybridnav._base.typing import BoolArray, FloatArray, LongArray
@@ -35,14 +37,21 @@ __all__ = [
 ]
 
 
-def cells_of_line(free: BoolArray, positions: FloatArray) -> LongArray:
+def cells_of_line(
+    free: BoolArray, positions: FloatArray, ends: Sequence[Sequence[int]] = ()
+) -> LongArray:
     """Find the cells that a polyline on free cells passes.
 
     `free`: bool (rows, cols); `positions`: float64 (n, 2), n >= 1, (row, col) on the lattice of the
-    cells' corners. Returns int64 (m, 2), (row, col), each a neighbour of the one before, diagonally
-    where the line passes a corner. Where the line runs between two cells, a free one.
+    cells' corners; `ends`: the cells that it begins and ends in, which on a side may lie behind it.
+    Returns int64 (m, 2), (row, col), each a neighbour of the one before, diagonally where the line
+    passes a corner. Where the line runs between two cells, a free one.
     """
     # One memory layout, so that the kernel is compiled once.
     cells = np.ascontiguousarray(free).view()
     cells.flags.writeable = False
-    return passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))
+    passed = passed_cells(cells, np.ascontiguousarray(positions, dtype=np.float64))
+    for at, end in zip((0, -1), ends, strict=False):
+        if passed[at].tolist() != list(end):
+            passed = np.insert(passed, at % (len(passed) + 1), end, axis=0)
+    return passed

@@ -181,14 +181,7 @@ class OverLattice(Method):
 def cells_passed(query: Query, line: CostLine, points: FloatArray) -> LongArray:
     """Return the cells that a line passes, from start to goal."""
     free, positions = line.free.view(np.bool_), line.on_grain(points)
-    passed = cells_of_line(free, positions)
-    # For an end on a side, the cell behind the side may be listed.
-    parts = [passed]
-    if tuple(passed[0].tolist()) != query.cells[0]:
-        parts.insert(0, np.array([query.cells[0]]))
-    if tuple(passed[-1].tolist()) != query.cells[1]:
-        parts.append(np.array([query.cells[1]]))
-    passed = passed if len(parts) == 1 else np.concatenate(parts)
+    passed = cells_of_line(free, positions, query.cells)
     if query.one_way is None or not query.one_way.bars(passed, free):
         return passed
     from hybridnav.search.mesh import cells_across  # noqa: PLC0415 - the lattice needs no mesh

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -282,33 +282,27 @@ class OverMesh(Method):
     def _cells_along(self, query: Query, path: MeshPath) -> LongArray:
         """Return the cells that a path passes, from start to goal."""
         assert path.positions is not None  # noqa: S101 - only paths are asked for their cells
-        passed = cells_of_line(self._free, path.positions)
+        passed = cells_of_line(self._free, path.positions, query.cells)
         if query.closed is not None and query.closed.holds(passed @ self._across).any():
-            passed = self._passed_beside(query.closed, path.positions)
-        # For an end on a side, the cell behind the side may be listed.
-        cells = query.cells
-        parts = [passed]
-        if tuple(passed[0].tolist()) != cells[0]:
-            parts.insert(0, np.array([cells[0]]))
-        if tuple(passed[-1].tolist()) != cells[1]:
-            parts.append(np.array([cells[1]]))
-        passed = passed if len(parts) == 1 else np.concatenate(parts)
+            passed = self._passed_beside(query.closed, path.positions, query.cells)
         if query.closed is None or query.one_way is None:
             return passed
         # Along a side, or at a corner, the cell on the other hand may be listed.
         with self._round(self._on_mesh(), query.closed).open_cells() as free:
             if not query.one_way.bars(passed, free):
                 return passed
-            return cells_across(free, query.one_way, path.positions, cells)
+            return cells_across(free, query.one_way, path.positions, query.cells)
 
-    def _passed_beside(self, closed: ClosedCells, positions: FloatArray) -> LongArray:
+    def _passed_beside(
+        self, closed: ClosedCells, positions: FloatArray, ends: Sequence[tuple[int, int]]
+    ) -> LongArray:
         """Return the cells that a path along sides of closed cells passes, without these."""
         low = np.maximum(positions.min(axis=0).astype(np.int64) - 1, 0)
         high = positions.max(axis=0).astype(np.int64) + 2
         free = self._free[low[0] : high[0], low[1] : high[1]].copy()
         at = np.stack(np.divmod(closed.flat, self._free.shape[1]), axis=1) - low
         free[tuple(at[((at >= 0) & (at < free.shape)).all(axis=1)].T)] = False
-        return cells_of_line(free, positions - low) + low
+        return cells_of_line(free, positions - low, (np.array(ends) - low).tolist()) + low
 
     def _round(self, search: MeshSearch, closed: ClosedCells) -> DetourSearch:
         # By identity: `Closures` returns the same object for equal closures.
