@@ -1,17 +1,16 @@
 """Alternatives: paths between two points that pass other doors."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any, overload
+from typing import Any
 
 from numpy.typing import ArrayLike
 
 from hybridnav.closures.blocked import Closable
 from hybridnav.errors import InvalidValueError
 from hybridnav.guide.by_doors import Chosen, DoorTours, RouteLimits
-from hybridnav.guide.tour import Tour, plan_tour
+from hybridnav.guide.tour import Ranked, Tour, plan_tour
 from hybridnav.maps.checks import checked_whole
 from hybridnav.planning import Path, PlanResult
 from hybridnav.planning.named import At
@@ -83,9 +82,11 @@ class Alternative:
         return self.tour.to_dict() | {"doors": list(self.doors), "overlap": self.overlap}
 
 
-@dataclass(frozen=True, eq=False)
-class Alternatives(Sequence[Alternative]):
-    """Alternatives of one query, and whether they are all.
+class Alternatives(Ranked[Alternative]):
+    """Alternatives of one query, a sequence: none if no path exists.
+
+    `complete` states whether these are as many as requested, or all candidates within the limits,
+    which are not all sequences of doors; `note` why there are fewer.
 
     Examples
     --------
@@ -99,28 +100,6 @@ class Alternatives(Sequence[Alternative]):
     >>> found.note
     '1 of 3: the map has no rooms, so no doors'
     """
-
-    found: tuple[Alternative, ...]
-    """The alternatives; none if no path exists."""
-    complete: bool
-    """Whether these are as many as requested, or all candidates within the limits, which are not
-    all sequences of doors. False if the search stopped before."""
-    note: str = ""
-    """The reason why there are fewer than requested, one line; empty if there are not."""
-
-    @overload
-    def __getitem__(self, index: int) -> Alternative: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[Alternative, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> Alternative | tuple[Alternative, ...]:
-        """Return one alternative, or some."""
-        return self.found[index]
-
-    def __len__(self) -> int:
-        """Return the number of alternatives found."""
-        return len(self.found)
 
 
 def unplanned(status: str) -> Alternatives:
@@ -215,20 +194,19 @@ def _by_doors(
     plan, solved; `limits`: what they must keep to; `by_costs`: whether the planner plans by costs.
     """
     chosen = [Chosen(first)] if search is None else search.find(limits)
-    found = tuple(Alternative(one.tour, one.overlap) for one in chosen)
-    if len(found) == limits.count:
-        return Alternatives(found, complete=True)
+    alternatives = tuple(Alternative(one.tour, one.overlap) for one in chosen)
+    if len(alternatives) == limits.count:
+        return Alternatives(alternatives, complete=True)
     if search is not None and not search.is_complete:
         n_planned = search.n_planned
         note = f"the search stopped after {n_planned} sequences of doors: there may be more"
-        return Alternatives(found, complete=False, note=note)
+        return Alternatives(alternatives, complete=False, note=note)
     reason = _reason(search, limits, by_costs=by_costs)
-    note = f"{len(found)} of {limits.count}: {reason}"
-    return Alternatives(found, complete=True, note=note)
+    note = f"{len(alternatives)} of {limits.count}: {reason}"
+    return Alternatives(alternatives, complete=True, note=note)
 
 
 def _reason(search: DoorTours | None, limits: RouteLimits, *, by_costs: bool) -> str:
-    """Describe why there are no more alternatives."""
     if search is None:
         return "the map has no rooms, so no doors"
     if search.is_in_one_room:

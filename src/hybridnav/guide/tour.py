@@ -1,10 +1,10 @@
-"""Tours with several waypoints, described by rooms and doors."""
+"""Tours with several waypoints, described by rooms and doors, and routes in their order."""
 
 import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, overload
 
 from numpy.typing import ArrayLike
 
@@ -19,6 +19,7 @@ from hybridnav.planning.planner import HybridPlanner
 from hybridnav.planning.settings import Smooth
 from hybridnav.search.found import ClosedCells
 
+_T = TypeVar("_T")
 _COUNTS = ("expanded", "expanded_places", "expanded_intervals", "corridor_cells")
 
 
@@ -189,6 +190,33 @@ def _joined_points(parts: list[dict[str, Any]]) -> tuple[list[list[float]], list
 def _summed(parts: list[dict[str, float]]) -> dict[str, float]:
     stages = dict.fromkeys(stage for part in parts for stage in part)
     return {stage: round(sum(part.get(stage, 0.0) for part in parts), 6) for stage in stages}
+
+
+@dataclass(frozen=True, eq=False)
+class Ranked(Sequence[_T]):
+    """Routes that a search has found, the best first: a sequence of them."""
+
+    found: tuple[_T, ...]
+    """The routes."""
+    complete: bool
+    """Whether there are as many as requested, or all that keep to the limits: False where the
+    search stopped before."""
+    note: str = ""
+    """The reason why there are fewer than requested, one line; empty if there are not."""
+
+    @overload
+    def __getitem__(self, index: int) -> _T: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[_T, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> _T | tuple[_T, ...]:
+        """Return one route, or some."""
+        return self.found[index]
+
+    def __len__(self) -> int:
+        """Return the number of routes."""
+        return len(self.found)
 
 
 def plan_tour(

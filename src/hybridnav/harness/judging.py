@@ -3,6 +3,7 @@
 import hashlib
 import math
 from collections.abc import Container
+from contextlib import closing, suppress
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +13,7 @@ from hybridnav import check_proof
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.trig import hypots
 from hybridnav._base.typing import LongArray
-from hybridnav.errors import InvalidValueError
+from hybridnav.errors import InvalidValueError, UnsuitableMapError
 from hybridnav.harness.adapters import HybridMethod
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
 from hybridnav.harness.consistency import Consistency
@@ -26,7 +27,8 @@ from hybridnav.harness.judges import (
     judge_path,
     line_cells,
 )
-from hybridnav.harness.methods import Prepared
+from hybridnav.harness.methods import Prepared, prepare
+from hybridnav.harness.names import MethodSpec
 from hybridnav.harness.records import Record
 from hybridnav.harness.scenes import Pair
 from hybridnav.harness.yardstick import (
@@ -41,6 +43,7 @@ from hybridnav.harness.yardstick import (
 )
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.costs import CostLayer, cost_along
+from hybridnav.maps.files import example_map
 from hybridnav.search.grid_search import GridSearch
 
 Cell = tuple[int, int]
@@ -171,8 +174,8 @@ class Judge:
             if faults:
                 return {}, faults
             length_m = optima.get("octile_m")
-        known, faults = self._oracles.ask(answer, pair, length_m)
-        return optima | known, faults
+        figures, faults = self._oracles.ask(answer, pair, length_m)
+        return optima | figures, faults
 
     def in_order_m(self, pair: Pair, answer: MethodResult) -> float | None:
         """Return the length of the shortest path of cells through the regions of the plan in their
@@ -192,15 +195,15 @@ class Judge:
         if answer.nodes is None or self._search is None:
             return None
         self._regions[list(answer.nodes)] = True
-        found = self._search.search(
+        optimum = self._search.search(
             pair.start, pair.goal, field_of=self._region_of, in_corridor=self._regions
         )
         self._regions[list(answer.nodes)] = False
-        if found.cells is None:
+        if optimum.cells is None:
             return None
         if self._layer is not None:
-            return self._layer.cost_of_cells(found.cells) * self._grid.resolution_m
-        return path_length_in_cells(found.cells) * self._grid.resolution_m
+            return self._layer.cost_of_cells(optimum.cells) * self._grid.resolution_m
+        return path_length_in_cells(optimum.cells) * self._grid.resolution_m
 
 
 def status_of(answer: MethodResult) -> str:
@@ -271,13 +274,13 @@ class Oracles:
     ) -> tuple[Record, list[str]]:
         """Return fields of the record, and faults; `length_m` is the octile optimum as far as the
         reference knows it."""
-        known: Record = {}
+        figures: Record = {}
         faults = []
         length = math.inf if length_m is None else length_m
         sampled = self._sample is None or pair in self._sample
         if sampled:
             optimum = float(self._scipy.lengths_from(pair.start)[pair.goal])
-            known["scipy_optimum_m"] = optimum if math.isfinite(optimum) else None
+            figures["scipy_optimum_m"] = optimum if math.isfinite(optimum) else None
             if not (length == optimum or abs(length - optimum) <= SLACK * optimum):
                 faults.append(compared("the optimum by scipy is {}, not {}", optimum, length))
         if pair.stated_optimum_cells is not None:
@@ -289,14 +292,14 @@ class Oracles:
             optimum = self._any_angle.length_m(pair.start, pair.goal)
             words = "the any-angle optimum by the mesh is {}"
             if not optimum <= length * (1 + SLACK):
-                return known, [compared(words + ", a path of cells has {}", optimum, length)]
+                return figures, [compared(words + ", a path of cells has {}", optimum, length)]
             if sampled:
                 other = self._visibility.shortest(pair.start, pair.goal).length_m
                 if not abs(optimum - other) <= SLACK * other:
-                    return known, [compared(words + ", by a visibility graph {}", optimum, other)]
-                known["visibility_optimum_m"] = other
-            known["any_angle_m"] = optimum
-        return known, faults
+                    return figures, [compared(words + ", by a visibility graph {}", optimum, other)]
+                figures["visibility_optimum_m"] = other
+            figures["any_angle_m"] = optimum
+        return figures, faults
 
 
 class CostJudge:
@@ -350,10 +353,10 @@ class CostJudge:
                 of_cells = {"cost_grid_bound_m": claim.grid_bound_m}
                 if not 0 <= claim.grid_bound_m < math.inf:
                     faults.append(f"{claim.grid_bound_m} m is no lower bound on paths of cells")
-        known: Record = {"cost_m": cost_m, "cost_lower_bound_m": bound_m if bound_m >= 0 else 0.0}
+        figures: Record = {"cost_m": cost_m, "cost_lower_bound_m": bound_m if bound_m >= 0 else 0.0}
         if not math.isfinite(bound_m):
-            known["cost_lower_bound_m"] = None
-        return known if faults else known | of_cells, faults
+            figures["cost_lower_bound_m"] = None
+        return figures if faults else figures | of_cells, faults
 
     def _cost_of_line(self, line: AnyAngleResult) -> tuple[float, float]:
         """Return the cost of an any-angle path, and by how much a claim may differ, in metres."""
@@ -382,3 +385,22 @@ class CostJudge:
         lengths = hypots(steps[:, 0], steps[:, 1])
         costs = lengths * (factors[:-1] + factors[1:]) / 2
         return math.fsum(costs.tolist()) * self._grid.resolution_m
+
+
+def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
+    """Compile or load the kernels of a method on a small map, so that no time includes it.
+
+    A method that cannot take that map may yet take those of the run.
+    """
+    if (spec.digest, by_costs) in _WARM or spec.is_recorded:
+        return
+    grid = example_map("figure1", robot_radius_m=0)
+    layer = CostLayer.clearance(grid) if by_costs else None
+    with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
+        Judge(grid, prepared, reference=False, costs=layer)
+        for goal in ((2, 2), (grid.shape[0] - 3, 12)):
+            prepared.ask((2, 2), goal)()
+    _WARM.add((spec.digest, by_costs))
+
+
+_WARM: set[tuple[str, bool]] = set()

@@ -15,6 +15,7 @@ from hybridnav.harness.yardstick import (
     ANY_ANGLE_SLACK,
     NOT_ASKED,
     PLANNED,
+    REGIONS,
     SLACK,
     TOO_SLOW,
     Optimum,
@@ -31,9 +32,6 @@ EXPANSIONS = {
 """Fields of records that count things taken from the queue of a search, and their columns."""
 
 _FINE = ("ready", NOT_ASKED, *ANSWERED)
-
-REGIONS = "regions"
-"""Metric of methods that have plans alone."""
 
 MapQuery = tuple[str, QueryKey]
 
@@ -146,11 +144,11 @@ class Outcome:
             "any-angle": any_angle,
             "both": np.where(lines, any_angle, octile),
         }
-        found = {"lengths_m": figure("length_m"), "costs_m": figure("cost_m")}
-        judged = found["costs_m" if self.yardstick == "weighted" else "lengths_m"]
+        measured = {"lengths_m": figure("length_m"), "costs_m": figure("cost_m")}
+        judged = measured["costs_m" if self.yardstick == "weighted" else "lengths_m"]
         missed = of_grid | self._faulty
         return {
-            **{name: np.where(missed, math.nan, values) for name, values in found.items()},
+            **{name: np.where(missed, math.nan, values) for name, values in measured.items()},
             "judged_m": np.where(missed, math.nan, judged),
             "fallback_m": np.where(of_grid & ~self._faulty, judged, math.nan),
             "best_m": best[self.yardstick],
@@ -208,8 +206,8 @@ class Outcome:
 
     def _known(self, key: str, missing: float = math.nan) -> FloatArray:
         """Return one number of each record of the reference."""
-        known = (record.get(key) for record in self.references)
-        return np.array([missing if value is None else value for value in known], dtype=float)
+        values = (record.get(key) for record in self.references)
+        return np.array([missing if value is None else value for value in values], dtype=float)
 
     @cached_property
     def solved_keys(self) -> set[MapQuery]:
@@ -230,8 +228,8 @@ class Outcome:
     def by_grid(self) -> float:
         """Number of paths that are the grid's, because the method found none; NaN for a method
         without such a fallback."""
-        known = [record for record in self.matched if record and record.get("by_grid") is not None]
-        return float(sum(record["by_grid"] for record in known)) if known else math.nan
+        asked = [record for record in self.matched if record and record.get("by_grid") is not None]
+        return float(sum(record["by_grid"] for record in asked)) if asked else math.nan
 
     @property
     def preparation_seconds(self) -> float:
@@ -336,5 +334,5 @@ def pairs_in_common(outcomes: Iterable[Outcome]) -> set[MapQuery]:
         if outcome.label in partly:
             continue
         solved.setdefault(outcome.label, set()).update(outcome.solved_keys)
-    known = [pairs for pairs in solved.values() if pairs]
-    return set.intersection(*known) if known else set()
+    of_methods = [pairs for pairs in solved.values() if pairs]
+    return set.intersection(*of_methods) if of_methods else set()

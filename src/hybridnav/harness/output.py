@@ -14,7 +14,7 @@ from hybridnav.harness import columns, tables
 from hybridnav.harness.analysis import Study, load_study, rows_of_map, rows_of_study
 from hybridnav.harness.judges import distance_buckets
 from hybridnav.harness.names import REFERENCE
-from hybridnav.harness.outcome import REGIONS, Outcome, nanmean, nanquantile, pairs_in_common
+from hybridnav.harness.outcome import Outcome, nanmean, nanquantile, pairs_in_common
 from hybridnav.harness.records import Record
 from hybridnav.harness.report import (
     CaseKey,
@@ -24,7 +24,7 @@ from hybridnav.harness.report import (
     counter_examples,
     render_report,
 )
-from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, YARDSTICKS, Optimum, Yardstick
+from hybridnav.harness.yardstick import OPTIMA, REFERS_TO, REGIONS, YARDSTICKS, Optimum, Yardstick
 from hybridnav.planning import Preset
 from hybridnav.refine.ompl import OmplSettings
 
@@ -182,7 +182,7 @@ def _rows_by_distance(study: Study, name: str, optimum: Optimum) -> list[tables.
 def failures_of(study: Study) -> list[tuple[str, str]]:
     """Return for each method and map with queries without an answer the reason of the first, and
     its traceback, empty for none."""
-    found = []
+    failures = []
     for outcome in study.outcomes:
         record = outcome.failure
         if record is not None:
@@ -192,8 +192,8 @@ def failures_of(study: Study) -> list[tuple[str, str]]:
                 f"{outcome.map_name}, {outcome.label}: {outcome.failures:,} queries without an "
                 f"answer; {what}: {reason}"
             )
-            found.append((text, str(record.get("traceback", ""))))
-    return found
+            failures.append((text, str(record.get("traceback", ""))))
+    return failures
 
 
 def _pairs_text(study: Study) -> str:
@@ -212,11 +212,11 @@ def _pairs_text(study: Study) -> str:
 
 def _machines(study: Study) -> dict[str, str]:
     """Return versions and host of the runs, as recorded; several if they differ."""
-    found: dict[str, dict[str, None]] = {}
+    machines: dict[str, dict[str, None]] = {}
     for outcome in study.outcomes:
         for key, value in outcome.preparation.get("environment", {}).items():
-            found.setdefault(key, {})[value] = None
-    return {key: ", ".join(values) for key, values in found.items()}
+            machines.setdefault(key, {})[value] = None
+    return {key: ", ".join(values) for key, values in machines.items()}
 
 
 def _methods(study: Study) -> tables.Table:
@@ -226,18 +226,18 @@ def _methods(study: Study) -> tables.Table:
 def _tables(study: Study, rows: Sequence[tables.Row]) -> list[tables.Table]:
     """Return the tables of Thrun's three criteria: one of losses over each optimum."""
     presets = study.presets
-    found = [tables.table_of(rows, columns.CONSISTENCY_COLUMNS, "Consistency")]
+    parts = [tables.table_of(rows, columns.CONSISTENCY_COLUMNS, "Consistency")]
     for optimum in YARDSTICKS[study.metric]:
         chosen = columns.loss_columns(optimum)
-        known = [row for row in rows if _has_loss(row, optimum)]
-        if known:
-            note = tables.ahead_of_presets(known, chosen, presets)
-            found.append(tables.table_of(known, chosen, f"Loss over {OPTIMA[optimum]}", note))
+        with_loss = [row for row in rows if _has_loss(row, optimum)]
+        if with_loss:
+            note = tables.ahead_of_presets(with_loss, chosen, presets)
+            parts.append(tables.table_of(with_loss, chosen, f"Loss over {OPTIMA[optimum]}", note))
     timed = any(tables.with_values(rows, column) for column in columns.EFFICIENCY_COLUMNS)
     if timed:
         note = tables.ahead_of_presets(rows, columns.EFFICIENCY_COLUMNS, presets)
-        found.append(tables.table_of(rows, columns.EFFICIENCY_COLUMNS, _EFFICIENCY, note))
-    return found
+        parts.append(tables.table_of(rows, columns.EFFICIENCY_COLUMNS, _EFFICIENCY, note))
+    return parts
 
 
 def _has_loss(row: tables.Row, optimum: Optimum) -> bool:
@@ -255,13 +255,13 @@ def _section(
     outcomes = study.of_map(name)
     first = outcomes[0].preparation
     shape = first.get("shape", [0, 0])
-    found = _tables(study, rows)
+    parts = _tables(study, rows)
     for optimum in YARDSTICKS[study.metric]:
         distance = _rows_by_distance(study, name, optimum)
         chosen = [key for row in distance for key in row if key != "method"]
         if chosen:
             caption = _BY_DISTANCE.format(OPTIMA[optimum])
-            found.append(tables.table_of(distance, list(dict.fromkeys(chosen)), caption))
+            parts.append(tables.table_of(distance, list(dict.fromkeys(chosen)), caption))
     cases = [case for outcome in outcomes for case in cases_of(outcome)]
     for at, (key, _) in enumerate(cases, start=1):
         drawn.setdefault(key, f"case-{number}-{at}")
@@ -273,7 +273,7 @@ def _section(
             ("robot radius", f"{first.get('robot_radius_m', 0):g} m"),
             ("SHA-256", str(first["map_sha"])[:16]),
         ],
-        tables=found,
+        tables=parts,
         losses=_drawn(study, outcomes),
         times_ms=_times_ms(study, outcomes),
         worst=[case for _, case in cases],
@@ -301,10 +301,10 @@ def _drawn(study: Study, outcomes: Iterable[Outcome]) -> dict[str, dict[str, Flo
             if optimum != "octile" or not outcome.is_any_angle:
                 losses = outcome.losses_over(optimum)[outcome.among(study.common)]
                 parts.setdefault(outcome.label, []).append(losses)
-        known = {label: np.concatenate(losses) for label, losses in parts.items()}
-        is_known = any(np.isfinite(losses).any() for losses in known.values())
-        if is_known and not (drawn and known.keys() == {REFERENCE}):
-            drawn[OPTIMA[optimum]] = known
+        joined = {label: np.concatenate(losses) for label, losses in parts.items()}
+        is_known = any(np.isfinite(losses).any() for losses in joined.values())
+        if is_known and not (drawn and joined.keys() == {REFERENCE}):
+            drawn[OPTIMA[optimum]] = joined
     return drawn
 
 
@@ -375,15 +375,15 @@ def _words(settings: dict[str, Any]) -> str:
 
 def _unlike(own: dict[str, Any], usual: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     """Return the settings that differ from the usual ones, by dotted key."""
-    found: dict[str, Any] = {}
+    differing: dict[str, Any] = {}
     for key, value in own.items():
         other = usual.get(key)
         if isinstance(value, dict):
             inner = other if isinstance(other, dict) else (_OF_OMPL if key == "ompl" else {})
-            found |= _unlike(value, inner, f"{prefix}{key}.")
+            differing |= _unlike(value, inner, f"{prefix}{key}.")
         elif value != other and value is not None:
-            found[f"{prefix}{key}"] = value
-    return found
+            differing[f"{prefix}{key}"] = value
+    return differing
 
 
 def _not_asked(outcomes: Sequence[Outcome], n_maps: int) -> str:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.harness.outcome import REGIONS
-from hybridnav.harness.yardstick import OPTIMA
+from hybridnav.harness.yardstick import OPTIMA, REGIONS
 
 Row = dict[str, str | float]
 
@@ -180,12 +179,12 @@ def ahead_of_presets(rows: Sequence[Row], columns: Iterable[str], presets: Colle
     judged = {column: sign_of[shown(column)] for column in columns if shown(column) in sign_of}
     if not own or not others or not judged:
         return ""
-    found = [
+    ahead = [
         part for column, sign in judged.items() if (part := _ahead_in(column, sign, own, others))
     ]
-    if not found:
+    if not ahead:
         return "No other method is ahead of every preset here."
-    return f"Ahead of every preset here: {'; '.join(found)}."
+    return f"Ahead of every preset here: {'; '.join(ahead)}."
 
 
 def _ahead_in(column: str, sign: int, own: Sequence[Row], others: Sequence[Row]) -> str:

@@ -3,7 +3,7 @@
 import math
 import traceback
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +12,7 @@ from hybridnav._base.clock import clock
 from hybridnav.errors import HybridNavError, InvalidValueError, UnsuitableMapError
 from hybridnav.harness.adapters import checked
 from hybridnav.harness.baselines import AnyAngleResult, MethodResult
-from hybridnav.harness.judging import Judge, status_of
+from hybridnav.harness.judging import Judge, status_of, warm_up
 from hybridnav.harness.methods import Prepared, prepare
 from hybridnav.harness.names import REFERENCE, MethodSpec, own_settings
 from hybridnav.harness.records import (
@@ -35,8 +35,6 @@ from hybridnav.harness.scenes import (
 )
 from hybridnav.harness.yardstick import NOT_ASKED, TOO_SLOW, Fault
 from hybridnav.maps import CellClass
-from hybridnav.maps.costs import CostLayer
-from hybridnav.maps.files import example_map
 
 
 @dataclass(frozen=True)
@@ -355,22 +353,3 @@ def _plan_steps(answer: MethodResult) -> int | None:
     if answer.plan_steps is not None:
         return int(answer.plan_steps)
     return None if answer.nodes is None else len(answer.nodes) - 1
-
-
-def warm_up(spec: MethodSpec, *, by_costs: bool) -> None:
-    """Compile or load the kernels of a method on a small map, so that no time includes it.
-
-    A method that cannot take that map may yet take those of the run.
-    """
-    if (spec.digest, by_costs) in _WARM or spec.is_recorded:
-        return
-    grid = example_map("figure1", robot_radius_m=0)
-    layer = CostLayer.clearance(grid) if by_costs else None
-    with suppress(UnsuitableMapError), closing(prepare(spec, grid, layer)) as prepared:
-        Judge(grid, prepared, reference=False, costs=layer)
-        for goal in ((2, 2), (grid.shape[0] - 3, 12)):
-            prepared.ask((2, 2), goal)()
-    _WARM.add((spec.digest, by_costs))
-
-
-_WARM: set[tuple[str, bool]] = set()

@@ -21,12 +21,12 @@ import numpy as np
 
 from hybridnav._base.clock import clock
 from hybridnav.errors import InvalidValueError
+from hybridnav.harness.judging import warm_up
 from hybridnav.harness.methods import Prepared, prepare
 from hybridnav.harness.names import MethodSpec
 from hybridnav.harness.outcome import Outcome
 from hybridnav.harness.records import Record, query_key
 from hybridnav.harness.scenes import MapSpec, Pair, read_scene
-from hybridnav.harness.task import warm_up
 
 _DIGITS = 12
 LONG_S = 0.05
@@ -218,17 +218,17 @@ class Circumstances:
     @property
     def warnings(self) -> list[str]:
         """What speaks against the times, a sentence each."""
-        found = []
+        notes = []
         if self.is_busy:
-            found.append(
+            notes.append(
                 f"The machine was busy: a load of up to {self.most_load:.2f}; this run made 1 "
                 "of it. Measure again on a quiet machine."
             )
         if self.apart:
-            found.append(
+            notes.append(
                 f"Times of {', '.join(self.apart)} were not taken beside those of the others."
             )
-        return found
+        return notes
 
 
 def lay_times(
@@ -307,10 +307,10 @@ def _own_loads(loaded: Sequence[Record]) -> tuple[float, ...]:
     if not loaded:
         return ()
     began, before = datetime.fromisoformat(loaded[0]["date"]), loaded[0]["load"]
-    found = []
+    loads = []
     for record in loaded:
         passed_s = (datetime.fromisoformat(record["date"]) - began).total_seconds()
         if passed_s >= _MEMORY_S:
             share = math.exp(-passed_s / _MEMORY_S)
-            found.append((record["load"] - share * before) / (1 - share))
-    return tuple(found or (record["load"] for record in loaded))
+            loads.append((record["load"] - share * before) / (1 - share))
+    return tuple(loads or (record["load"] for record in loaded))

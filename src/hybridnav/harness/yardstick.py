@@ -11,6 +11,9 @@ from hybridnav.search.mesh import MeshSearch, build_mesh
 Cell = tuple[int, int]
 Record = dict[str, Any]
 
+REGIONS = "regions"
+"""Metric of methods that have plans alone."""
+
 Yardstick = Literal["both", "any-angle", "octile", "weighted"]
 """What losses refer to: each path's own metric, in a run with costs `weighted`; for all paths the
 any-angle optimum; the octile optimum, which any-angle paths have no loss over; the least cost of

@@ -3,13 +3,13 @@ from .plan import BuildingAlternatives as BuildingAlternatives
 from .building import Building as Building
 from .floors import Floor as Floor
 from .graph_check import (
-    BuildingGraphCheck as BuildingGraphCheck,
     check_building_graph as check_building_graph,
-    BuildingGraphReport as BuildingGraphReport,
-    RouteCounts as RouteCounts,
     judge_building_graph as judge_building_graph,
 )
 from .graph_match import (
+    BuildingGraphCheck as BuildingGraphCheck,
+    BuildingGraphReport as BuildingGraphReport,
+    RouteCounts as RouteCounts,
     MatchedGraph as MatchedGraph,
     MatchedLink as MatchedLink,
     match_graph as match_graph,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -16,9 +15,9 @@ from hybridnav.closures.blocked import Blocked, Closable, as_blocked
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.fleet import checks, why
 from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
-from hybridnav.ext.fleet.links import ClosedLink, Link, LinkNetwork
-from hybridnav.ext.fleet.plan import Answers, BuildingAlternatives, BuildingPlan
-from hybridnav.ext.fleet.search import Endpoint, LinkSearch
+from hybridnav.ext.fleet.links import ClosedLink, Endpoint, Link, LinkNetwork
+from hybridnav.ext.fleet.plan import BuildingAlternatives, BuildingPlan
+from hybridnav.ext.fleet.search import Answers, LinkSearch
 from hybridnav.maps.names import place_of_name
 from hybridnav.models.container import Part
 from hybridnav.planning import HybridPlanner, Profile
@@ -147,8 +146,8 @@ class Building:
         InvalidValueError
             When there is none; the message suggests the nearest ones.
         """
-        known = tuple(link.name for link in self.links)
-        return self.links[place_of_name(name, known, "link")]
+        names = tuple(link.name for link in self.links)
+        return self.links[place_of_name(name, names, "link")]
 
     def plan(  # noqa: PLR0913 - start, goal, and conditions with defaults
         self,
@@ -322,17 +321,17 @@ class Building:
     def _network(self, closed: Collection[ClosedLink], stairs: bool) -> LinkNetwork:  # noqa: FBT001
         """Return the links that may be used."""
         key = frozenset(closed), bool(stairs)
-        found = self._networks.get(key)
-        if found is None:
+        network = self._networks.get(key)
+        if network is None:
             radius_m = self.robot_radius_m
             links = [
                 link
                 for link in self.links
                 if ClosedLink(link.name) not in key[0] and link.admits(radius_m, stairs=key[1])
             ]
-            found = LinkNetwork(links, self._index_of, self._rows, self.speed_m_s, key[0])
-            self._networks = {**dict(list(self._networks.items())[-15:]), key: found}
-        return found
+            network = LinkNetwork(links, self._index_of, self._rows, self.speed_m_s, key[0])
+            self._networks = {**dict(list(self._networks.items())[-15:]), key: network}
+        return network
 
     def _under_profile(
         self,
@@ -355,30 +354,27 @@ class Building:
             return plans(one, (1, 1.0))[0], self._under(one).floors
 
         under = self._under(chosen)
-        found = under._with_reasons(plans(chosen, limits), start, goal, asked)  # noqa: SLF001
-        note = "" if found[0].solved else checks.reason_under(chosen, wider)
+        routes = under._with_reasons(plans(chosen, limits), start, goal, asked)  # noqa: SLF001
+        note = "" if routes[0].solved else checks.reason_under(chosen, wider)
         of: dict[str, Any] = {"profile": chosen.name, "note": note}
-        return replace(found, found=tuple(replace(plan, **of) for plan in found))
+        return routes.told(of)
 
     def _with_reasons(
         self,
-        found: BuildingAlternatives,
+        routes: BuildingAlternatives,
         start: FloorWaypoint,
         goal: FloorWaypoint,
         asked: _Asked,
     ) -> BuildingAlternatives:
-        if found[0].solved:
-            return found
+        if routes[0].solved:
+            return routes
         shut = why.shut_of(asked.blocked, asked.closed_links, stairs=asked.stairs)
 
         def is_solved(still: list[why.Shut]) -> bool:
             given = asked._replace(**why.conditions(still, asked.blocked))
             return self._plans(start, goal, given, (1, 1.0))[0].solved
 
-        endpoints = (
-            checks.endpoint_of("start", start, self.floors),
-            checks.endpoint_of("goal", goal, self.floors),
-        )
+        endpoints = checks.endpoints_of(start, goal, self.floors)
         network = self._network((), stairs=True)
 
         def shut_on(blocked: Mapping[str, Closable]) -> dict[str, Blocked]:
@@ -391,10 +387,10 @@ class Building:
 
         opening = why.to_open(shut, is_solved), shut_on(asked.blocked), shut_on({})
         of: dict[str, Any] = {
-            "reasons": why.reasons(found[0], endpoints, self.floors, network, opening),
+            "reasons": why.reasons(routes[0], endpoints, self.floors, network, opening),
             "to_open": tuple(one.named("en") for one in opening[0]),
         }
-        return replace(found, found=tuple(replace(plan, **of) for plan in found))
+        return routes.told(of)
 
     def _under(self, profile: Profile) -> Building:
         """Return the building under a profile, made anew where a map or costs have changed."""
@@ -455,22 +451,19 @@ class Building:
         )
         while True:
             search, tables, endpoints, closed = self._search(start, goal, asked)
-            found = answers.found(search, endpoints, limits, began)
-            if not found[0].solved:
+            plans = answers.found(search, endpoints, limits, began)
+            if not plans[0].solved:
                 refused = checks.refusal_of(endpoints, self.floors, closed)
-                found = found if refused is None else (answers.refused(refused, endpoints),)
+                plans = plans if refused is None else (answers.refused(refused, endpoints),)
             if all(table.is_current for table in tables):
-                return BuildingAlternatives.of(found, limits, complete=search.is_complete)
+                return BuildingAlternatives.of(plans, limits, complete=search.is_complete)
 
     def _search(
         self, start: FloorWaypoint, goal: FloorWaypoint, asked: _Asked
     ) -> tuple[LinkSearch, list[FloorTable], tuple[Endpoint, Endpoint], dict[int, ClosedCells]]:
         """Return the search of a query, and what it is made of."""
         network, tables = self._network(asked.closed_links, asked.stairs), self._current()
-        endpoints = (
-            checks.endpoint_of("start", start, self.floors),
-            checks.endpoint_of("goal", goal, self.floors),
-        )
+        endpoints = checks.endpoints_of(start, goal, self.floors)
         closed = self._closed(asked.blocked, endpoints, network)
         search = LinkSearch(network, tables, endpoints, closed, asked.at)
         return search, tables, endpoints, closed
@@ -488,9 +481,9 @@ class Building:
             return closed
         for index, table in enumerate(self._tables):
             cells_of, shut = table.floor.planner.closed, closed.get(index)
-            found = own.joined(cells_of, more.get(index), shut)
-            if found is not table.closed:
-                closed[index] = found or ClosedCells(np.empty(0, dtype=np.int64))
+            closure = own.joined(cells_of, more.get(index), shut)
+            if closure is not table.closed:
+                closed[index] = closure or ClosedCells(np.empty(0, dtype=np.int64))
         return closed
 
     def _closures(
@@ -560,6 +553,6 @@ def tightest(
             shut = blocked.get(name, Blocked())
             shut |= Blocked() if journal is None else journal.closures(name)
             planner = building.floor(name).planner
-            found = explain_solved(planner, ends, named, blocked=shut, radius_m=radius_m)
-            lines += [why.on_floor(name, line, language) for line in found.words(language)]
+            reasons = explain_solved(planner, ends, named, blocked=shut, radius_m=radius_m)
+            lines += [why.on_floor(name, line, language) for line in reasons.words(language)]
     return list(dict.fromkeys(lines))  # a tour passes a place again

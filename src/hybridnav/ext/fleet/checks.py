@@ -14,9 +14,8 @@ from hybridnav._base.typing import LongArray
 from hybridnav.closures import OutOfOrder
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.floors import Floor
-from hybridnav.ext.fleet.links import ClosedLink, Link, LinkEnd
+from hybridnav.ext.fleet.links import ClosedLink, Endpoint, Link, LinkEnd
 from hybridnav.ext.fleet.plan import BuildingPlan
-from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.guide.words.itinerary import guide_of
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
@@ -74,7 +73,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
 
     Raises `InvalidValueError` when a link is refused.
     """
-    known = {floor.name: floor for floor in floors}
+    by_name = {floor.name: floor for floor in floors}
     seen: set[str] = set()
     for link in links:
         checked_type("links", link, Link)
@@ -85,7 +84,7 @@ def check_links(links: Sequence[Link], floors: Sequence[Floor]) -> None:
         if link.name in seen:
             raise InvalidValueError(f"link {link.name}: the name is given twice")
         seen.add(link.name)
-        check_ends(link, known)
+        check_ends(link, by_name)
 
 
 def check_ends(link: Link, floors: Mapping[str, Floor]) -> None:
@@ -148,8 +147,8 @@ class FloorParts(NamedTuple):
     @classmethod
     def of(cls, floor: Floor) -> FloorParts:
         """Find the parts of a floor."""
-        found = parts_of(floor, allow_unexplored=floor.planner.preset.planner.allow_unexplored)
-        return cls(found, np.bincount(found[found >= 0]))
+        part_of = parts_of(floor, allow_unexplored=floor.planner.preset.planner.allow_unexplored)
+        return cls(part_of, np.bincount(part_of[part_of >= 0]))
 
 
 def check_reach(link: Link, floors: Mapping[str, Floor], parts: Mapping[str, FloorParts]) -> None:
@@ -204,13 +203,16 @@ def check_speed(speed_m_s: float) -> float:
 # Starts and goals in buildings: a floor, and a point or a name on it.
 
 
-def endpoint_of(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
-    """Return the floor of a start or goal, and the point or name on it.
+def endpoints_of(start: Any, goal: Any, floors: Sequence[Floor]) -> tuple[Endpoint, Endpoint]:
+    """Return the floors of a start and a goal, and the points or names on them.
 
-    `what`: "start" or "goal"; `given`: what the caller gave; `floors`: the floors of the building.
-    Raises `InvalidValueError` when it is neither, the floor or the name is not known, the name is
-    on several floors, or the point is not two finite numbers.
+    Raises `InvalidValueError` when one is neither, a floor or a name is not known, a name is on
+    several floors, or a point is not two finite numbers.
     """
+    return _endpoint("start", start, floors), _endpoint("goal", goal, floors)
+
+
+def _endpoint(what: str, given: Any, floors: Sequence[Floor]) -> Endpoint:
     if isinstance(given, str):
         index, waypoint = _floor_of_name(given, floors), given
     elif isinstance(given, tuple | list) and len(given) == 2 and isinstance(given[0], str):  # noqa: PLR2004
@@ -232,17 +234,17 @@ def _floor_of_name(name: str, floors: Sequence[Floor]) -> int:
     names_of = [
         () if floor.rooms is None else (*floor.rooms.names, *floor.rooms.points) for floor in floors
     ]
-    found = [number for number, names in enumerate(names_of) if name in names]
-    if len(found) == 1:
-        return found[0]
-    if not found:
-        known = tuple(dict.fromkeys(each for names in names_of for each in names))
-        hint = did_you_mean(name, known) if known else ": no floor has rooms"
+    numbers = [number for number, names in enumerate(names_of) if name in names]
+    if len(numbers) == 1:
+        return numbers[0]
+    if not numbers:
+        all_names = tuple(dict.fromkeys(each for names in names_of for each in names))
+        hint = did_you_mean(name, all_names) if all_names else ": no floor has rooms"
         raise InvalidValueError(f"no room or point of the building is called {name!r:.80}{hint}")
-    on = " and ".join(floors[number].name for number in found[:3])
+    on = " and ".join(floors[number].name for number in numbers[:3])
     raise InvalidValueError(
         f"{name!r:.80} is a name on floors {on}: give the floor too, as in "
-        f"{floors[found[0]].name}:{name:.80}, or in Python the pair of floor and name"
+        f"{floors[numbers[0]].name}:{name:.80}, or in Python the pair of floor and name"
     )
 
 
@@ -306,14 +308,14 @@ def links_under(links: Sequence[Link], floors: Mapping[str, Floor], profile: Pro
 
     `links`: the links of the building; `floors`: the floors, by name.
     """
-    found = []
+    usable = []
     for link in links:
         radius_m = next(iter(floors.values())).planner.grid.robot_radius_m
         if link.admits(radius_m, stairs=profile.stairs):
             ends = [_end_under(end, floors[end.floor]) for end in link.ends]
             if None not in ends:
-                found.append(replace(link, ends=tuple(end for end in ends if end is not None)))
-    return found
+                usable.append(replace(link, ends=tuple(end for end in ends if end is not None)))
+    return usable
 
 
 def _end_under(end: LinkEnd, floor: Floor) -> LinkEnd | None:

@@ -102,9 +102,9 @@ def check_facts(check: GraphCheck) -> list[tuple[str, str]]:
     """Return the figures of a check, each with its name."""
     grid, graph = check.grid, check.graph
     clear, free = int(check.is_clear.sum()), int(check.is_free.sum())
-    known = f", frame {graph.frame}" if graph.frame else ""
+    frame = f", frame {graph.frame}" if graph.frame else ""
     facts = [
-        ("graph", f"{graph.name}, {graph.format}{known}"),
+        ("graph", f"{graph.name}, {graph.format}{frame}"),
         ("map", f"{grid.name}, robot radius {grid.robot_radius_m:g} m"),
         ("nodes", f"{graph.n_nodes:,}, the robot fits at {free:,}"),
         ("edges", f"{graph.n_edges:,}, the robot can follow {clear:,}"),
@@ -186,7 +186,7 @@ def _part(name: str, findings: tuple[Finding, ...]) -> dict[str, Any]:
 
 def _rows(report: BuildingGraphReport) -> list[list[str]]:
     """Return the table of routes, its heads first."""
-    from hybridnav.ext.fleet.graph_check import Answer  # noqa: PLC0415 - buildings alone need it
+    from hybridnav.ext.fleet.graph_match import Answer  # noqa: PLC0415 - buildings alone need it
 
     answers = get_args(Answer)
     heads = [*answers, "loss mean", "p95", "most", "steps", "expanded", "graph, ms", "building, ms"]

@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -13,13 +13,19 @@ from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.ext.fleet.building import Building
 from hybridnav.ext.fleet.checks import parts_of
-from hybridnav.ext.fleet.graph_match import MatchedGraph
+from hybridnav.ext.fleet.graph_match import (
+    Answer,
+    BuildingGraphCheck,
+    BuildingGraphReport,
+    MatchedGraph,
+    RouteCounts,
+)
 from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Position
 from hybridnav.ext.fleet.plan import BuildingPlan
 from hybridnav.graphs.check import GraphCheck, check_graph
 from hybridnav.graphs.free_space import LEAST_AREA_M2
-from hybridnav.graphs.gather import Finding, Findings, shown
-from hybridnav.graphs.judge import Excess, excess_of
+from hybridnav.graphs.gather import Findings, shown
+from hybridnav.graphs.judge import excess_of
 from hybridnav.graphs.waypoint_graph import (
     add_one_way,
     components_of,
@@ -30,36 +36,6 @@ from hybridnav.graphs.waypoint_graph import (
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.planning.settings import ShortestSettings
 from hybridnav.rooms.find import outside_of
-
-
-@dataclass(frozen=True, eq=False)
-class BuildingGraphCheck:
-    """The graph of a building on its maps, and its faults. Made by `check_building_graph`.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.fleet import Building, Floor, building_graph
-    >>> from hybridnav.ext.fleet import check_building_graph, match_graph
-    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
-    >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
-    >>> graph = building_graph(house)
-    >>> check = check_building_graph(match_graph(house, graph))
-    >>> [found.kind for found in check.findings], list(check.floors)  # no link joins the floors
-    (['island'], ['1', '2'])
-    """
-
-    matched: MatchedGraph
-    """The graph, matched to the building."""
-    floors: dict[str, GraphCheck]
-    """The faults on each floor, by its name."""
-    findings: tuple[Finding, ...]
-    """Faults of floors, links, and the graph as a whole; empty for none."""
-
-    @property
-    def count(self) -> int:
-        """Number of all cases of all findings."""
-        own = sum(found.count for found in self.findings)
-        return own + sum(check.count for check in self.floors.values())
 
 
 def check_building_graph(matched: MatchedGraph) -> BuildingGraphCheck:
@@ -113,7 +89,7 @@ def _checked_floors(network: BuildingNetwork) -> dict[str, GraphCheck]:
         graph = floor.graph.graph
         check = check_graph(network.building.floor(floor.name).planner.topology, graph)
         findings = Findings()
-        findings.add_all(found for found in check.findings if found.kind not in _WHOLE)
+        findings.add_all(finding for finding in check.findings if finding.kind not in _WHOLE)
         here = one_way - floor.base
         add_one_way(findings, graph, here[(here >= 0) & (here < graph.n_nodes)])
         checks[floor.name] = replace(check, findings=findings.collected())
@@ -173,88 +149,22 @@ def _parts(network: BuildingNetwork) -> LongArray:
                 at += [bases[index] + part] if part >= 0 else []
             joined += [(at[0], other) for other in at[1:]]
     whole = components_of(bases[-1], np.array(joined, dtype=np.int64).reshape(-1, 2), "weak")
-    found = np.full(network.n_nodes, -1, dtype=np.int64)
+    part_of = np.full(network.n_nodes, -1, dtype=np.int64)
     for index, floor in network.floors.items():
         free = np.flatnonzero(floor.placed.is_free)
         labels = part_at[index][tuple(floor.placed.cells[free].T)]
-        found[floor.base + free] = whole[bases[index] + labels]
-    return found
+        part_of[floor.base + free] = whole[bases[index] + labels]
+    return part_of
 
 
 # How the routes on the graph of a building compare with its shortest ones, over all floors.
 
-Answer = Literal["solved", "contradicted", "no path, right", "no path, wrong", "no node in sight"]
+
 _MOST_EXAMPLES = 100
 _WHOLE = frozenset({"one-way", "island"})
 """Kinds that hold of the graph of all floors, not of each."""
 _ROUNDED = 1.0 - 1e-9
 """Factor on the optimum below which no route costs, sums being rounded."""
-
-
-@dataclass(frozen=True)
-class RouteCounts:
-    """Routes between some pairs of points, beside the optimum of the building.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.fleet import RouteCounts
-    >>> counts = RouteCounts({"solved": 3, "no path, wrong": 1}, None, 4.0, 20.0, (1e-4, 1e-3))
-    >>> counts.pairs, counts.inconsistent
-    (4, 1)
-    """
-
-    answers: dict[Answer, int]
-    """Number of pairs by the answer of the graph."""
-    loss: Excess | None
-    """Cost of the solved routes over the optimum, less 1; None if none is solved."""
-    steps: float
-    """Mean number of straight lines and rides of the solved routes."""
-    expanded: float
-    """Mean number of nodes that the searches of the solved routes have expanded."""
-    seconds: tuple[float, float]
-    """Median of the wall-clock seconds for a route on the graph, and for one by the building."""
-
-    @property
-    def pairs(self) -> int:
-        """Number of pairs."""
-        return sum(self.answers.values())
-
-    @property
-    def inconsistent(self) -> int:
-        """Number of pairs whose answer the building contradicts."""
-        return self.answers.get("contradicted", 0) + self.answers.get("no path, wrong", 0)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values for JSON."""
-        loss = None if self.loss is None else vars(self.loss) | {}
-        return {
-            "pairs": self.pairs,
-            "answers": dict(self.answers),
-            "loss": loss,
-            "steps": self.steps,
-            "expanded": self.expanded,
-            "seconds": {"graph": self.seconds[0], "building": self.seconds[1]},
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class BuildingGraphReport:
-    """Consistency, loss and efficiency of the routes on the graph of a building. Made by
-    `judge_building_graph`.
-
-    Examples
-    --------
-    >>> from hybridnav.ext.fleet import BuildingGraphReport, RouteCounts
-    >>> counts = RouteCounts({"solved": 3}, None, 4.0, 20.0, (1e-4, 1e-3))
-    >>> BuildingGraphReport({"one floor": counts}, ()).counts["one floor"].inconsistent
-    0
-    """
-
-    counts: dict[str, RouteCounts]
-    """The figures of the pairs on `one floor`, on `two floors`, and of `all`; kinds without pairs
-    are left out."""
-    contradictions: tuple[str, ...]
-    """The first 100 pairs whose answer the building contradicts, and why, one line each."""
 
 
 @dataclass(frozen=True)
@@ -375,14 +285,14 @@ def drawn_pairs(
             f"{building.robot_radius_m:g} m: lower the radius"
         )
     floors = list(cells_of)
-    found = []
+    drawn = []
     for number in range(count):
         first = int(rng.choice(floors))
         others = [floor for floor in floors if floor != first] if number % 2 else []
         last = int(rng.choice(others)) if others else first
         start, goal = (cells_of[at][rng.integers(len(cells_of[at]))] for at in (first, last))
-        found.append(((first, start), (last, goal)))
-    return found
+        drawn.append(((first, start), (last, goal)))
+    return drawn
 
 
 def _judged(

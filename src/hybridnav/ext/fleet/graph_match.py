@@ -1,7 +1,8 @@
-"""The graph of a building that others have made, matched to the floors and links of its maps."""
+"""The graph of a building that others have made, matched to its maps; faults and routes found."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorGraph, Point, join_links
 from hybridnav.ext.fleet.links import Link
 from hybridnav.graphs.attach import placed_points
+from hybridnav.graphs.check import GraphCheck
+from hybridnav.graphs.gather import Finding
+from hybridnav.graphs.judge import Excess
 from hybridnav.maps.checks import checked_type
 
 AT_LINK_M = 1.0
@@ -59,14 +63,11 @@ class MatchedGraph:
     """
 
     building: Building
-    """The building."""
     name: str
-    """Name of the graph."""
     floors: dict[str, FloorGraph]
     """The graph of each floor by its name in the building, in the frame of its map, with a node at
     each end of a link."""
     links: tuple[MatchedLink, ...]
-    """The links of the graph."""
     unknown_floors: tuple[str, ...]
     """Names of the floors of the graph that the building does not have."""
 
@@ -82,6 +83,104 @@ class MatchedGraph:
             if end.floor in link.ends
         ]
         return max(away, default=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingGraphCheck:
+    """The graph of a building on its maps, and its faults. Made by `check_building_graph`.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph
+    >>> from hybridnav.ext.fleet import check_building_graph, match_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = Building([Floor(name, hn.HybridPlanner(topology)) for name in ("1", "2")])
+    >>> graph = building_graph(house)
+    >>> check = check_building_graph(match_graph(house, graph))
+    >>> [found.kind for found in check.findings], list(check.floors)  # no link joins the floors
+    (['island'], ['1', '2'])
+    """
+
+    matched: MatchedGraph
+    floors: dict[str, GraphCheck]
+    """The faults on each floor, by its name."""
+    findings: tuple[Finding, ...]
+    """Faults of floors, links, and the graph as a whole; empty for none."""
+
+    @property
+    def count(self) -> int:
+        """Number of all cases of all findings."""
+        own = sum(finding.count for finding in self.findings)
+        return own + sum(check.count for check in self.floors.values())
+
+
+Answer = Literal["solved", "contradicted", "no path, right", "no path, wrong", "no node in sight"]
+
+
+@dataclass(frozen=True)
+class RouteCounts:
+    """Routes between some pairs of points, beside the optimum of the building.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import RouteCounts
+    >>> counts = RouteCounts({"solved": 3, "no path, wrong": 1}, None, 4.0, 20.0, (1e-4, 1e-3))
+    >>> counts.pairs, counts.inconsistent
+    (4, 1)
+    """
+
+    answers: dict[Answer, int]
+    """Number of pairs by the answer of the graph."""
+    loss: Excess | None
+    """Cost of the solved routes over the optimum, less 1; None if none is solved."""
+    steps: float
+    """Mean number of straight lines and rides of the solved routes."""
+    expanded: float
+    """Mean number of nodes that the searches of the solved routes have expanded."""
+    seconds: tuple[float, float]
+    """Median of the wall-clock seconds for a route on the graph, and for one by the building."""
+
+    @property
+    def pairs(self) -> int:
+        """Number of pairs."""
+        return sum(self.answers.values())
+
+    @property
+    def inconsistent(self) -> int:
+        """Number of pairs whose answer the building contradicts."""
+        return self.answers.get("contradicted", 0) + self.answers.get("no path, wrong", 0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        loss = None if self.loss is None else vars(self.loss) | {}
+        return {
+            "pairs": self.pairs,
+            "answers": dict(self.answers),
+            "loss": loss,
+            "steps": self.steps,
+            "expanded": self.expanded,
+            "seconds": {"graph": self.seconds[0], "building": self.seconds[1]},
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class BuildingGraphReport:
+    """Consistency, loss and efficiency of the routes on the graph of a building. Made by
+    `judge_building_graph`.
+
+    Examples
+    --------
+    >>> from hybridnav.ext.fleet import BuildingGraphReport, RouteCounts
+    >>> counts = RouteCounts({"solved": 3}, None, 4.0, 20.0, (1e-4, 1e-3))
+    >>> BuildingGraphReport({"one floor": counts}, ()).counts["one floor"].inconsistent
+    0
+    """
+
+    counts: dict[str, RouteCounts]
+    """The figures of the pairs on `one floor`, on `two floors`, and of `all`; kinds without pairs
+    are left out."""
+    contradictions: tuple[str, ...]
+    """The first 100 pairs whose answer the building contradicts, and why, one line each."""
 
 
 def match_graph(
@@ -168,25 +267,25 @@ def _placed(graph: FloorGraph, pose: Pose, floor: Floor) -> FloorGraph:
 def _matched_floors(
     building: Building, graph: BuildingGraph, given: Mapping[str, str]
 ) -> dict[str, str]:
-    known = [floor.name for floor in building.floors]
-    found = {floor.name: floor.name for floor in graph.floors if floor.name in known}
+    names = [floor.name for floor in building.floors]
+    matched = {floor.name: floor.name for floor in graph.floors if floor.name in names}
     for name, own in given.items():
-        found[graph.floor(name).name] = building.floor(own).name
-    if not found:
+        matched[graph.floor(name).name] = building.floor(own).name
+    if not matched:
         theirs = ", ".join(floor.name for floor in graph.floors)
         raise InvalidValueError(
             f"graph {graph.name!r:.60} has the floors {theirs[:200]} and the building has "
-            f"{', '.join(known)[:200]}: give the building's name of each, such as "
-            f"{{{graph.floors[0].name!r:.60}: {known[0]!r:.60}}}"
+            f"{', '.join(names)[:200]}: give the building's name of each, such as "
+            f"{{{graph.floors[0].name!r:.60}: {names[0]!r:.60}}}"
         )
-    for own in known:
-        twice = [name for name, other in found.items() if other == own]
+    for own in names:
+        twice = [name for name, other in matched.items() if other == own]
         if len(twice) > 1:
             raise InvalidValueError(
                 f"floors {twice[0]!r:.60} and {twice[1]!r:.60} of the graph are both floor "
                 f"{own!r:.60} of the building, expected one"
             )
-    return found
+    return matched
 
 
 def _poses(building: Building, graph: BuildingGraph, own_name: dict[str, str]) -> dict[str, Pose]:
@@ -220,7 +319,7 @@ def _matched_links(
 ) -> tuple[MatchedLink, ...]:
     own_links = {link.name: link for link in building.links}
     taken = {link.name for link in graph.links}
-    found = []
+    matched = []
     for link in graph.links:
         stops = [end for end in link.ends if end.floor in own_name]
         ends = {own_name[end.floor]: moved_point(end.position_m, poses[end.floor]) for end in stops}
@@ -230,8 +329,8 @@ def _matched_links(
             own = _nearest(link, ends, free)
         if own is not None:
             taken.add(own.name)
-        found.append(MatchedLink(link, own, {own_name[e.floor]: e.floor for e in stops}, ends))
-    return tuple(found)
+        matched.append(MatchedLink(link, own, {own_name[e.floor]: e.floor for e in stops}, ends))
+    return tuple(matched)
 
 
 def _nearest(drawn: Link, ends: dict[str, Point], links: list[Link]) -> Link | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
@@ -34,7 +35,6 @@ class LinkEnd:
     """
 
     floor: str
-    """Name of the floor."""
     position_m: tuple[float, float]
     """`(x, y)` in metres, in the frame of the floor."""
     yaw_rad: float | None = None
@@ -96,9 +96,9 @@ class Link:
     def __post_init__(self) -> None:
         """Refuse what no planner could use."""
         if self.kind not in get_args(LinkKind):
-            known = ", ".join(get_args(LinkKind))
+            kinds = ", ".join(get_args(LinkKind))
             raise InvalidValueError(
-                f"link {self.name} is of kind {self.kind!r:.40}, not one of {known}"
+                f"link {self.name} is of kind {self.kind!r:.40}, not one of {kinds}"
             )
         floors = [end.floor for end in self.ends]
         if len(floors) <= 1 or len(set(floors)) < len(floors):
@@ -230,11 +230,11 @@ class ClosedLink(NamedTuple):
 
         Raises `InvalidValueError` when no link has this name, or stops there.
         """
-        known = {link.name: cls(link.name) for link in links}
+        by_text = {link.name: cls(link.name) for link in links}
         if isinstance(text, str) and "@" in text:
             stops = [cls(link.name, end.floor) for link in links for end in link.ends]
-            known = {f"{one.link}@{one.floor}": one for one in stops} | known
-        return list(known.values())[place_of_name(text, tuple(known), "link")]
+            by_text = {f"{one.link}@{one.floor}": one for one in stops} | by_text
+        return list(by_text.values())[place_of_name(text, tuple(by_text), "link")]
 
 
 # The ends of links, the rides between them, and the cheapest ways over them.
@@ -252,6 +252,14 @@ class End(NamedTuple):
     """Index of the floor."""
     at: int
     """Its row in the table of the floor."""
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """Start or goal of a query: the index of its floor, and a point or a name on it."""
+
+    floor: int
+    waypoint: ArrayLike | str
 
 
 class ChosenParts(NamedTuple):
@@ -357,15 +365,15 @@ class LinkNetwork:
         onward: LongArray,
         left: FloatArray,
         costs_on: Callable[[int], FloatArray],
-        known: tuple[FloatArray, LongArray],
+        reached_by: tuple[FloatArray, LongArray],
     ) -> np.ndarray:
         """Relax the costs of all ends from those at which rides have ended.
 
         `onward`: int64 (k,), these ends; `left`: float64 (n_ends,), the cost at which each is left;
-        `costs_on`: as in `cheapest`; `known`: the cost at which each end is reached, and from which
-        end; both are overwritten.
+        `costs_on`: as in `cheapest`; `reached_by`: the cost at which each end is reached, and from
+        which end; both are overwritten.
         """
-        reached, came = known
+        reached, came = reached_by
         fresh = np.zeros(len(reached), dtype=np.bool_)
         for floor in np.unique(self._floor_of[onward]).tolist():
             ends, rows = self._on_floor[floor], onward[self._floor_of[onward] == floor]

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, overload
+from typing import Any
 
 from typing_extensions import Self
 
-from hybridnav._base.clock import clock
 from hybridnav._base.copies import Source, made, made_state
 from hybridnav.errors import PlanError
-from hybridnav.ext.fleet.floors import ROUNDED, Floor
-from hybridnav.ext.fleet.links import START, LinkNetwork, Part, Ride
-from hybridnav.ext.fleet.search import COUNTS, Endpoint, LinkSearch, stats_of
+from hybridnav.ext.fleet.links import Ride
+from hybridnav.guide.tour import Ranked
 from hybridnav.guide.words import FloorChange, Instruction, Space, sentences
-from hybridnav.guide.words.itinerary import Guide, guide_of, heading_of, waypoint_text
+from hybridnav.guide.words.itinerary import Guide, heading_of
 from hybridnav.planning import Metric, Path, PlanResult, PlanStats, PlanStatus
+
+COUNTS = ("expanded", "expanded_places", "expanded_intervals")
+"""The counts of `PlanStats` that add up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,18 +156,18 @@ class BuildingPlan:
         Infinite or missing values are None. `results` has those of `PlanResult.to_dict` for each
         floor, and the floor.
         """
-        known = self.solved
+        solved = self.solved
         return {
             "status": str(self.status),
             "metric": self.metric,
             "start": _plain(self.start),
             "goal": _plain(self.goal),
-            "length_m": self.length_m if known else None,
-            "charge_m": self.charge_m if known else None,
-            "cost": self.cost if known else None,
-            "lower_bound": self.lower_bound if known else None,
-            "gap": self.gap if known else None,
-            "travel_s": self.travel_s if known else None,
+            "length_m": self.length_m if solved else None,
+            "charge_m": self.charge_m if solved else None,
+            "cost": self.cost if solved else None,
+            "lower_bound": self.lower_bound if solved else None,
+            "gap": self.gap if solved else None,
+            "travel_s": self.travel_s if solved else None,
             "floors": list(self.floors),
             "rides": [ride.to_dict() for ride in self.rides],
             "results": [
@@ -179,7 +179,7 @@ class BuildingPlan:
             "instructions": [instruction.to_dict() for instruction in self.instructions],
             "words": self.words(),
             "why": None
-            if known
+            if solved
             else {"words": list(self.reasons.get("en", ())), "to_open": list(self.to_open)},
             **({} if self.profile is None else {"profile": self.profile, "note": self.note}),
         }
@@ -197,107 +197,6 @@ def cost_of(results: Sequence[PlanResult], rides: Sequence[Ride]) -> float:
         cost += ride.charge_m
         cost += result.cost
     return cost
-
-
-# From the routes that a search has chosen to plans.
-
-
-class Answers:
-    """Makes the plans of a building.
-
-    `network`: the links that may be used; `speed_m_s`: metres per second that the robot drives.
-    """
-
-    def __init__(self, floors: Sequence[Floor], network: LinkNetwork, speed_m_s: float) -> None:
-        self._floors, self._network, self._speed_m_s = floors, network, speed_m_s
-
-    def refused(self, status: PlanStatus, endpoints: tuple[Endpoint, Endpoint]) -> BuildingPlan:
-        """Return the plan of a query without a route."""
-        start, goal = (self._named(end) for end in endpoints)
-        return BuildingPlan(status, "octile", start, goal, speed_m_s=self._speed_m_s)
-
-    def found(
-        self,
-        search: LinkSearch,
-        endpoints: tuple[Endpoint, Endpoint],
-        limits: tuple[int, float],
-        began: float,
-    ) -> tuple[BuildingPlan, ...]:
-        """Search routes, and return them as plans.
-
-        `search`: the search of a query; `endpoints`: its start and goal; `limits`: most routes, and
-        cost of one over that of the first, at most; `began`: when the query began, by
-        `clock`.
-        """
-        count, stretch = limits
-        if count == 1:
-            best = search.best()
-            chosen = [] if best is None else [best]
-        else:
-            ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
-            chosen = list(itertools.islice(ranked, count))
-        bound = search.bound()
-        results = [tuple(search.results[part] for part in one.parts) for one in chosen]
-        stats = stats_of([result.stats for result in search.planned], clock() - began)
-        if not chosen:
-            metrics = [result.metric for result in search.planned[:1]]
-            refused = self.refused(search.reason(), endpoints)
-            metric = metrics[0] if metrics else refused.metric
-            return (replace(refused, metric=metric, lower_bound=bound, stats=stats),)
-        return tuple(
-            self._plan(endpoints, (one.parts, of_parts), bound, stats)
-            for one, of_parts in zip(chosen, results, strict=True)
-        )
-
-    def _plan(
-        self,
-        endpoints: tuple[Endpoint, Endpoint],
-        route: tuple[tuple[Part, ...], tuple[PlanResult, ...]],
-        bound: float,
-        stats: PlanStats,
-    ) -> BuildingPlan:
-        parts, results = route
-        rides = tuple(itertools.starmap(self._ride, itertools.pairwise(parts)))
-        floors = [self._floors[self._floor_of(part, endpoints)] for part in parts]
-        start, goal = (self._named(end) for end in endpoints)
-        guided = GuidedRoute(
-            tuple(guide_of(floor.planner) for floor in floors),
-            results,
-            rides,
-            waypoint_text(endpoints[1].waypoint),
-        )
-        cost = cost_of(results, rides)
-        return BuildingPlan(
-            PlanStatus.SOLVED,
-            results[0].metric,
-            start,
-            goal,
-            results,
-            tuple(floor.name for floor in floors),
-            rides,
-            # Sums are rounded: a bound that differs from the cost by that alone is the cost.
-            lower_bound=cost if bound >= cost * ROUNDED else bound,
-            speed_m_s=self._speed_m_s,
-            stats=stats,
-            instructions_source=guided,
-        )
-
-    def _floor_of(self, part: Part, endpoints: tuple[Endpoint, Endpoint]) -> int:
-        return endpoints[0].floor if part[0] == START else self._network.ends[part[0]].floor
-
-    def _ride(self, before: Part, after: Part) -> Ride:
-        """Return the ride between two parts of a route."""
-        entered, left = self._network.ends[before[1]], self._network.ends[after[0]]
-        charges = dict(self._network.rides[before[1]])
-        from_floor, to_floor = self._floors[entered.floor].name, self._floors[left.floor].name
-        return Ride(self._network.links[entered.link], from_floor, to_floor, charges[after[0]])
-
-    def _named(self, end: Endpoint) -> tuple[str, tuple[float, ...] | str]:
-        name, waypoint = self._floors[end.floor].name, end.waypoint
-        if isinstance(waypoint, str):
-            return name, waypoint
-        x, y = (float(number) for number in waypoint)  # type: ignore[union-attr, arg-type]
-        return name, (x, y)
 
 
 # Instructions for a person on a route over floors.
@@ -318,7 +217,7 @@ class GuidedRoute:
         """Find the instructions; none if no floor has rooms."""
         if all(guide is None for guide in self.guides):
             return ()
-        found: list[Instruction] = []
+        told: list[Instruction] = []
         driven_m = 0.0
         for number, (guide, result) in enumerate(zip(self.guides, self.results, strict=True)):
             path, ride = result.path, self.rides[number] if number < len(self.rides) else None
@@ -327,24 +226,24 @@ class GuidedRoute:
             here = self._on_floor(guide, path, before, heading_of(result.start))
             here = [replace(one, at_m=one.at_m + driven_m) for one in here]
             if before is not None and here[0].kind == "start" and len(here) > 1:
-                here = self._joined(found, here)
+                here = self._joined(told, here)
             if ride is not None:
                 change = self._change(ride, self.guides[number + 1])
                 last = replace(here[-1], waypoint=None, landmark=None)
                 here[-1] = replace(last, kind="ride", change=change)
-            found += here
+            told += here
             driven_m += path.length_m
-        return tuple(found)
+        return tuple(told)
 
-    def _joined(self, found: list[Instruction], here: list[Instruction]) -> list[Instruction]:
-        """Return the instructions on a floor behind a ride, the last one of `found`.
+    def _joined(self, told: list[Instruction], here: list[Instruction]) -> list[Instruction]:
+        """Return the instructions on a floor behind a ride, the last one of `told`.
 
         The turn of the first step belongs to the sentence of the ride, and a start that shows no
         direction needs none.
         """
-        change, start = found[-1].change, here[0]
+        change, start = told[-1].change, here[0]
         if change is not None and change.has_exit:
-            found[-1] = replace(found[-1], turn=start.turn)
+            told[-1] = replace(told[-1], turn=start.turn)
             return here[1:]
         is_needed = start.landmark is not None or start.heading_rad is not None
         return here if is_needed else here[1:]
@@ -374,9 +273,10 @@ class GuidedRoute:
 # Routes over floors by different links, and whether there may be more.
 
 
-@dataclass(frozen=True, eq=False)
-class BuildingAlternatives(Sequence["BuildingPlan"]):
-    """The routes that `Building.alternatives` has found, the cheapest first: a sequence of them.
+class BuildingAlternatives(Ranked[BuildingPlan]):
+    """The routes that `Building.alternatives` has found, the cheapest first: a sequence of plans.
+
+    One that is not solved if there is no route. `complete` and `note` are as in `Alternatives`.
 
     Examples
     --------
@@ -388,37 +288,20 @@ class BuildingAlternatives(Sequence["BuildingPlan"]):
     (1, True, True)
     """
 
-    found: tuple[BuildingPlan, ...]
-    """The plans; one that is not solved if there is no route."""
-    complete: bool
-    """Whether there are as many as requested, or all that keep to the limits: False where the
-    search stopped before."""
-    note: str = ""
-    """The reason why there are fewer than requested, one line; empty if there are not."""
-
-    @overload
-    def __getitem__(self, index: int) -> BuildingPlan: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> tuple[BuildingPlan, ...]: ...
-
-    def __getitem__(self, index: int | slice) -> BuildingPlan | tuple[BuildingPlan, ...]:
-        """Return one plan, or some."""
-        return self.found[index]
-
-    def __len__(self) -> int:
-        """Return the number of plans."""
-        return len(self.found)
+    def told(self, facts: dict[str, Any]) -> BuildingAlternatives:
+        """Return the same, with more fields of each plan."""
+        plans = tuple(replace(plan, **facts) for plan in self)
+        return BuildingAlternatives(plans, self.complete, self.note)
 
     @classmethod
     def of(
-        cls, found: tuple[BuildingPlan, ...], limits: tuple[int, float], *, complete: bool
+        cls, plans: tuple[BuildingPlan, ...], limits: tuple[int, float], *, complete: bool
     ) -> BuildingAlternatives:
         """Return the alternatives of a query, with the reason why there are no more.
 
         Parameters
         ----------
-        found
+        plans
             The plans.
         limits
             Most routes, and cost of one over that of the first, at most.
@@ -426,12 +309,12 @@ class BuildingAlternatives(Sequence["BuildingPlan"]):
             Whether the search has looked at all sequences of links that keep to the limits.
         """
         count, stretch = limits
-        if not found[0].solved:
-            return cls(found, complete=True, note=f"no route was planned: {found[0].status}")
-        if len(found) >= count:
-            return cls(found, complete=True)
+        if not plans[0].solved:
+            return cls(plans, complete=True, note=f"no route was planned: {plans[0].status}")
+        if len(plans) >= count:
+            return cls(plans, complete=True)
         if not complete:
-            note = f"the search stopped after {len(found)} of {count} routes: there may be more"
-            return cls(found, complete=False, note=note)
+            note = f"the search stopped after {len(plans)} of {count} routes: there may be more"
+            return cls(plans, complete=False, note=note)
         reason = f"no other sequence of links is at most {stretch:g} times as dear as the first"
-        return cls(found, complete=True, note=f"{len(found)} of {count}: {reason}")
+        return cls(plans, complete=True, note=f"{len(plans)} of {count}: {reason}")

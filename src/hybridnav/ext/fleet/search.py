@@ -1,33 +1,33 @@
 """The search of routes over floors, which plans on a floor only where the best route may lead."""
 
 import heapq
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from hybridnav._base.clock import clock
 from hybridnav._base.typing import FloatArray, IntArray
-from hybridnav.ext.fleet.floors import ROUNDED, FloorTable
-from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, LinkNetwork, Part
+from hybridnav.ext.fleet.floors import ROUNDED, Floor, FloorTable
+from hybridnav.ext.fleet.links import (
+    GOAL,
+    START,
+    ChosenParts,
+    Endpoint,
+    LinkNetwork,
+    Part,
+    Ride,
+)
+from hybridnav.ext.fleet.plan import COUNTS, BuildingPlan, GuidedRoute, cost_of
+from hybridnav.guide.words.itinerary import guide_of, waypoint_text
 from hybridnav.planning import HybridPlanner, PlanResult, PlanStats, PlanStatus
 from hybridnav.planning.named import At
 from hybridnav.search.found import ClosedCells
 
 _MOST_LABELS = 20_000
 """Labels after which the search for one more route ends."""
-
-COUNTS = ("expanded", "expanded_places", "expanded_intervals")
-"""The counts of `PlanStats` that add up."""
-
-
-@dataclass(frozen=True)
-class Endpoint:
-    """Start or goal of a query: the index of its floor, and a point or a name on it."""
-
-    floor: int
-    waypoint: ArrayLike | str
 
 
 @dataclass(frozen=True)
@@ -108,14 +108,14 @@ class LinkSearch:
     def best(self) -> ChosenParts | None:
         """Return the cheapest route, all of whose parts are planned; None if there is none."""
         while True:
-            found = self._least(lower=False)
-            if found is None or self._has_planned(found.parts):
-                return found
+            route = self._least(lower=False)
+            if route is None or self._has_planned(route.parts):
+                return route
 
     def bound(self) -> float:
         """Return the least sum of lower bounds and charges over all routes, infinite for none."""
-        found = self._least(lower=True)
-        return math.inf if found is None else found.cost
+        route = self._least(lower=True)
+        return math.inf if route is None else route.cost
 
     def reason(self) -> PlanStatus:
         """Return why there is no route, after one was searched."""
@@ -135,17 +135,17 @@ class LinkSearch:
 
         `max_cost`: cost that no route exceeds, by that of the first one.
         """
-        known: set[tuple[int, ...]] = set()
+        sequences: set[tuple[int, ...]] = set()
         most = math.inf
         while True:
-            found = self._least_other(known, most)
-            if found is None:
+            route = self._least_other(sequences, most)
+            if route is None:
                 return
-            if self._has_planned(found.parts):
-                if not known:
-                    most = max_cost(found.cost)
-                known.add(self._links_of(found.parts))
-                yield found
+            if self._has_planned(route.parts):
+                if not sequences:
+                    most = max_cost(route.cost)
+                sequences.add(self._links_of(route.parts))
+                yield route
 
     def _has_planned(self, parts: Sequence[Part]) -> bool:
         """Plan the parts that were not, until one costs more than expected; return whether none
@@ -172,17 +172,17 @@ class LinkSearch:
         table, closed = self._tables[floor], self._closed_on(floor)
         if start != START and goal != GOAL and floor not in self._closed:
             rows = self._network.ends[start].at, self._network.ends[goal].at
-            found, was_kept = table.between(*rows)
+            result, was_kept = table.between(*rows)
         else:
-            found, was_kept = self._between(table, part, closed), False
+            result, was_kept = self._between(table, part, closed), False
             costs, key = self._slot(part)
-            costs.known[key] = found.cost
-            costs.lower[key] = max(costs.lower[key], found.lower_bound)
+            costs.known[key] = result.cost
+            costs.lower[key] = max(costs.lower[key], result.lower_bound)
             if floor not in self._closed and (start == START) != (goal == GOAL):
-                self._compare(table, part, found)
-        self.results[part] = found
+                self._compare(table, part, result)
+        self.results[part] = result
         if not was_kept:
-            self.planned.append(found)
+            self.planned.append(result)
 
     def _closed_on(self, floor: int) -> ClosedCells | None:
         """Return the closed cells of a floor: those of the query, or those of its table."""
@@ -204,8 +204,8 @@ class LinkSearch:
         frame = table.floor.planner.grid.frame
         own = part_of[tuple(frame.cells_of(table.positions_m).T)]
         costs = self._costs_on(floor)
-        for known in (costs.lower, table.expected)[: 1 if floor in self._closed else 2]:
-            known[own[:, None] != own] = np.inf
+        for bounds in (costs.lower, table.expected)[: 1 if floor in self._closed else 2]:
+            bounds[own[:, None] != own] = np.inf
         on_floor = np.array(self._network.on_floor[floor], dtype=np.int64)
         rows = [self._network.ends[number].at for number in on_floor]
         for end, outer in ((self._start, self._first), (self._goal, self._last)):
@@ -220,7 +220,7 @@ class LinkSearch:
         )
         return table.floor.planner.plan(start, goal, blocked=closed, at=self._at)
 
-    def _compare(self, table: FloorTable, part: Part, found: PlanResult) -> None:
+    def _compare(self, table: FloorTable, part: Part, result: PlanResult) -> None:
         """Raise the bounds of other parts from the start, or to the goal, by the triangle
         inequality; a name is not one point, and has none."""
         end = self._start if part[0] == START else self._goal
@@ -235,9 +235,9 @@ class LinkSearch:
         away = (back if is_first else to) if is_directed else np.fmin(to, back)
         least = np.zeros(len(others))
         is_near = away < np.inf
-        least[is_near] = found.lower_bound - away[is_near]
-        if found.cost < math.inf and not is_directed:
-            least = np.maximum(least, table.lower[row, rows] - found.cost)
+        least[is_near] = result.lower_bound - away[is_near]
+        if result.cost < math.inf and not is_directed:
+            least = np.maximum(least, table.lower[row, rows] - result.cost)
         lower = (self._first if is_first else self._last).lower
         lower[others] = np.maximum(lower[others], least * ROUNDED)
 
@@ -285,13 +285,13 @@ class LinkSearch:
         outer = self._first, self._last, self._direct
         first, last, direct = (costs.lower if lower else costs.expected for costs in outer)
         on = (lambda floor: self._costs_on(floor).lower) if lower else self._expected_on
-        found = self._network.cheapest(first, last, on)
+        route = self._network.cheapest(first, last, on)
         direct_m = float(direct[0])
-        if direct_m < math.inf and (found is None or direct_m <= found.cost):
+        if direct_m < math.inf and (route is None or direct_m <= route.cost):
             return ChosenParts(direct_m, ((START, GOAL),))
-        return found
+        return route
 
-    def _least_other(self, known: set[tuple[int, ...]], most: float) -> ChosenParts | None:
+    def _least_other(self, sequences: set[tuple[int, ...]], most: float) -> ChosenParts | None:
         """Return the cheapest route with a sequence of links that is not known."""
         ahead = self._to_goal()
         ends, rides = self._network.ends, self._network.rides
@@ -302,7 +302,7 @@ class LinkSearch:
             least, cost, node, links, parts = heapq.heappop(heap)
             if least > most:
                 return None
-            if node == GOAL and links not in known:
+            if node == GOAL and links not in sequences:
                 return ChosenParts(cost, parts)
             if node == GOAL or (node, links) in done:
                 continue
@@ -347,6 +347,107 @@ class LinkSearch:
 
     def _links_of(self, parts: Sequence[Part]) -> tuple[int, ...]:
         return tuple(self._network.ends[part[1]].link for part in parts if part[1] != GOAL)
+
+
+# From the routes that a search has chosen to plans.
+
+
+class Answers:
+    """Makes the plans of a building.
+
+    `network`: the links that may be used; `speed_m_s`: metres per second that the robot drives.
+    """
+
+    def __init__(self, floors: Sequence[Floor], network: LinkNetwork, speed_m_s: float) -> None:
+        self._floors, self._network, self._speed_m_s = floors, network, speed_m_s
+
+    def refused(self, status: PlanStatus, endpoints: tuple[Endpoint, Endpoint]) -> BuildingPlan:
+        """Return the plan of a query without a route."""
+        start, goal = (self._named(end) for end in endpoints)
+        return BuildingPlan(status, "octile", start, goal, speed_m_s=self._speed_m_s)
+
+    def found(
+        self,
+        search: LinkSearch,
+        endpoints: tuple[Endpoint, Endpoint],
+        limits: tuple[int, float],
+        began: float,
+    ) -> tuple[BuildingPlan, ...]:
+        """Search routes, and return them as plans.
+
+        `search`: the search of a query; `endpoints`: its start and goal; `limits`: most routes, and
+        cost of one over that of the first, at most; `began`: when the query began, by
+        `clock`.
+        """
+        count, stretch = limits
+        if count == 1:
+            best = search.best()
+            chosen = [] if best is None else [best]
+        else:
+            ranked = search.ranked(lambda cost: stretch * cost / ROUNDED)
+            chosen = list(itertools.islice(ranked, count))
+        bound = search.bound()
+        results = [tuple(search.results[part] for part in one.parts) for one in chosen]
+        stats = stats_of([result.stats for result in search.planned], clock() - began)
+        if not chosen:
+            metrics = [result.metric for result in search.planned[:1]]
+            refused = self.refused(search.reason(), endpoints)
+            metric = metrics[0] if metrics else refused.metric
+            return (replace(refused, metric=metric, lower_bound=bound, stats=stats),)
+        return tuple(
+            self._plan(endpoints, (one.parts, of_parts), bound, stats)
+            for one, of_parts in zip(chosen, results, strict=True)
+        )
+
+    def _plan(
+        self,
+        endpoints: tuple[Endpoint, Endpoint],
+        route: tuple[tuple[Part, ...], tuple[PlanResult, ...]],
+        bound: float,
+        stats: PlanStats,
+    ) -> BuildingPlan:
+        parts, results = route
+        rides = tuple(itertools.starmap(self._ride, itertools.pairwise(parts)))
+        floors = [self._floors[self._floor_of(part, endpoints)] for part in parts]
+        start, goal = (self._named(end) for end in endpoints)
+        guided = GuidedRoute(
+            tuple(guide_of(floor.planner) for floor in floors),
+            results,
+            rides,
+            waypoint_text(endpoints[1].waypoint),
+        )
+        cost = cost_of(results, rides)
+        return BuildingPlan(
+            PlanStatus.SOLVED,
+            results[0].metric,
+            start,
+            goal,
+            results,
+            tuple(floor.name for floor in floors),
+            rides,
+            # Sums are rounded: a bound that differs from the cost by that alone is the cost.
+            lower_bound=cost if bound >= cost * ROUNDED else bound,
+            speed_m_s=self._speed_m_s,
+            stats=stats,
+            instructions_source=guided,
+        )
+
+    def _floor_of(self, part: Part, endpoints: tuple[Endpoint, Endpoint]) -> int:
+        return endpoints[0].floor if part[0] == START else self._network.ends[part[0]].floor
+
+    def _ride(self, before: Part, after: Part) -> Ride:
+        """Return the ride between two parts of a route."""
+        entered, left = self._network.ends[before[1]], self._network.ends[after[0]]
+        charges = dict(self._network.rides[before[1]])
+        from_floor, to_floor = self._floors[entered.floor].name, self._floors[left.floor].name
+        return Ride(self._network.links[entered.link], from_floor, to_floor, charges[after[0]])
+
+    def _named(self, end: Endpoint) -> tuple[str, tuple[float, ...] | str]:
+        name, waypoint = self._floors[end.floor].name, end.waypoint
+        if isinstance(waypoint, str):
+            return name, waypoint
+        x, y = (float(number) for number in waypoint)  # type: ignore[union-attr, arg-type]
+        return name, (x, y)
 
 
 def stats_of(planned: list[PlanStats], seconds: float) -> PlanStats:

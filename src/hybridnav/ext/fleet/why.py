@@ -8,9 +8,8 @@ from typing import Any
 
 from hybridnav.closures.blocked import Blocked, Closable, as_blocked
 from hybridnav.ext.fleet.floors import Floor
-from hybridnav.ext.fleet.links import ClosedLink, LinkNetwork
+from hybridnav.ext.fleet.links import ClosedLink, Endpoint, LinkNetwork
 from hybridnav.ext.fleet.plan import BuildingPlan
-from hybridnav.ext.fleet.search import Endpoint
 from hybridnav.planning import PlanStatus
 from hybridnav.reasons.why import Explanation, each_closure, explain
 from hybridnav.reasons.why_words import Closure, closure_words
@@ -67,12 +66,12 @@ def shut_of(
     blocked: Mapping[str, Closable], links: Collection[ClosedLink], *, stairs: bool
 ) -> list[Shut]:
     """Return what is closed in a query, each thing once."""
-    found = [Shut(link=one) for one in dict.fromkeys(links)]
-    found += [] if stairs else [Shut()]
+    things = [Shut(link=one) for one in dict.fromkeys(links)]
+    things += [] if stairs else [Shut()]
     for floor, given in blocked.items():
         for closure, one in each_closure(as_blocked(given)):
-            found.append(Shut(floor=floor, closure=closure, blocked=one))
-    return found
+            things.append(Shut(floor=floor, closure=closure, blocked=one))
+    return things
 
 
 def conditions(shut: Sequence[Shut], given: Mapping[str, Closable]) -> dict[str, Any]:
@@ -123,17 +122,17 @@ def reasons(
     `network`: the links that may be used with nothing closed; `opening`: what would have to open,
     what is closed on each floor, and what of it a profile closes for all queries.
     """
-    found, blocked, always = opening
+    opened, blocked, always = opening
     at = [_point_of(end, floors) for end in endpoints]
     is_end = plan.status.name.startswith(("START_", "GOAL_"))
-    if is_end and not (found and isinstance(endpoints[_is_goal(plan)].waypoint, str)):
+    if is_end and not (opened and isinstance(endpoints[_is_goal(plan)].waypoint, str)):
         number = int(_is_goal(plan))
         floor = floors[endpoints[number].floor]
         why = explain(floor.planner, at[number], at[number], blocked=blocked.get(floor.name))
         ends = tuple(one for one in why.blocked_ends if one.is_start == (number == 0))
         return _each(lambda to: _on(floor, replace(why, blocked_ends=ends).words(to), to))
-    if found:
-        return _each(lambda to: [_opening([one.named(to) for one in found], to)])
+    if opened:
+        return _each(lambda to: [_opening([one.named(to) for one in opened], to)])
     if plan.status is not PlanStatus.NO_PATH:
         return _each(lambda _: [])
     for number, floor in enumerate(floors[end.floor] for end in endpoints):
@@ -184,8 +183,8 @@ def _enclosed(
     ]
     ways += [other] if endpoints[0].floor == endpoints[1].floor else []
     closed = blocked.get(floor.name)
-    found = [explain(floor.planner, here, way, blocked=closed) for way in ways]
-    return found[-1] if found and not any(one.has_path for one in found) else None
+    reasons = [explain(floor.planner, here, way, blocked=closed) for way in ways]
+    return reasons[-1] if reasons and not any(one.has_path for one in reasons) else None
 
 
 def _each(lines: Callable[[str], list[str]]) -> dict[str, tuple[str, ...]]:
@@ -200,8 +199,8 @@ def _point_of(end: Endpoint, floors: Sequence[Floor]) -> tuple[float, ...]:
     if not isinstance(end.waypoint, str):
         return tuple(float(number) for number in end.waypoint)  # type: ignore[union-attr, arg-type]
     floor = floors[end.floor]
-    known = {} if floor.rooms is None else floor.rooms.points
-    return tuple(known.get(end.waypoint) or floor.planner.topology.rooms.point_of(end.waypoint))
+    points = {} if floor.rooms is None else floor.rooms.points
+    return tuple(points.get(end.waypoint) or floor.planner.topology.rooms.point_of(end.waypoint))
 
 
 def _on(floor: Floor, lines: Sequence[str], language: str) -> list[str]:

@@ -4,8 +4,12 @@ from .pyramid import OnlinePyramid as OnlinePyramid, Update as Update
 from .replay import ReplayStep as ReplayStep, grids_of_scans as grids_of_scans, replay as replay
 from .room_versions import OnlineRooms as OnlineRooms, RoomsUpdate as RoomsUpdate
 from .rooms_window import DoorEvents as DoorEvents, OnlineDoor as OnlineDoor
-from .identities import CarriedCosts as CarriedCosts, Flips as Flips, carry_costs as carry_costs
-from .tiles import NO_PLACE as NO_PLACE
+from .identities import (
+    CarriedCosts as CarriedCosts,
+    Flips as Flips,
+    NO_PLACE as NO_PLACE,
+    carry_costs as carry_costs,
+)
 from .files import (
     BagLog as BagLog,
     CarmenLog as CarmenLog,

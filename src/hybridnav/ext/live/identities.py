@@ -1,5 +1,5 @@
 """What of an older version is where in a newer one: its cells, and its places. Public: `Flips`,
-`CarriedCosts` and `carry_costs`.
+`CarriedCosts`, `carry_costs` and `NO_PLACE`.
 """
 
 import math
@@ -11,14 +11,14 @@ import numpy as np
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.ext.live.state import CellDraft
-from hybridnav.ext.live.tiles import NO_PLACE, Box
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.clearance import within_radius
 from hybridnav.maps.costs import CostLayer
-from hybridnav.rooms.carrying import Heirs, Overlap, heirs_of
+from hybridnav.rooms.carrying import Heirs, Overlap
 
+NO_PLACE = -1
+"""Number that stands for no place: that of occupied cells and of all outside the map."""
 _ALIGNED = 1e-6
 """Part of a cell by which the origins of two grids may lie beside whole cells."""
 
@@ -165,9 +165,9 @@ def _causes(old: IntArray, new: IntArray, areas: LongArray, now: IntArray) -> tu
 
 def _meets(number_of: IntArray, cells: BoolArray, n_numbers: int) -> BoolArray:
     """Return which numbers some cells have, bool (n_numbers,)."""
-    found = np.zeros(n_numbers, np.bool_)
-    found[number_of[cells & (number_of >= 0)]] = True
-    return found
+    meets = np.zeros(n_numbers, np.bool_)
+    meets[number_of[cells & (number_of >= 0)]] = True
+    return meets
 
 
 def _widened(cells: BoolArray) -> BoolArray:
@@ -178,13 +178,13 @@ def _widened(cells: BoolArray) -> BoolArray:
 
 
 def _beside(number_of: IntArray, numbers: BoolArray) -> BoolArray:
-    found = np.zeros(len(numbers), np.bool_)
+    beside = np.zeros(len(numbers), np.bool_)
     pairs = (number_of[1:], number_of[:-1]), (number_of[:, 1:], number_of[:, :-1])
     for one, other in pairs:
         apart = (one != other) & (one >= 0) & (other >= 0)
         for some, others in ((one[apart], other[apart]), (other[apart], one[apart])):
-            found[some[numbers[others]]] = True
-    return found
+            beside[some[numbers[others]]] = True
+    return beside
 
 
 def _numbers(of: BoolArray) -> frozenset[int]:
@@ -299,51 +299,20 @@ class Events(NamedTuple):
     """Old ones that bear their number still."""
 
 
-def settle(draft: CellDraft) -> Events:
-    """Give the places of a draft the numbers of old ones as far as these have heirs.
-
-    See `heirs_of`. Most places bear their final numbers already.
-    """
-    first = draft.before.next_place
-    moved: list[list[int]] = draft.tiles.moved(draft.before.tiles).tolist()
-    areas = draft.before.places.areas(
-        sorted({place for overlap in moved for place in overlap[:2] if NO_PLACE < place < first})
-    )
-    stay = dict(areas)
-    found: list[Overlap] = []
-    for old, went_to, cells in moved:
-        if old != NO_PLACE:
-            found.append((old, went_to, cells))
-            stay[old] -= cells
-    found += [(old, old, cells) for old, cells in stay.items() if cells > 0]
-    heirs = heirs_of(found, areas)
-    name = dict(heirs.name)
-    new = {place for _, place, _ in found} | set(draft.places.numbers(first))
-    for place in sorted(new - name.keys() - {NO_PLACE}):
-        name[place] = place
-        if place < first:
-            name[place] = draft.next_place
-            draft.next_place += 1
-    _renumber(draft, {place: final for place, final in name.items() if place != final})
-    now = draft.places.areas([*name.values()])
-    areas_now = {place: now[final] for place, final in name.items()}
-    return events_of(found, Heirs(heirs.of, name), areas_now, first)
-
-
 def events_of(
-    found: list[Overlap], heirs: Heirs, areas_now: Mapping[int, int], first: int
+    overlaps: list[Overlap], heirs: Heirs, areas_now: Mapping[int, int], first: int
 ) -> Events:
     """Return what became of places whose final numbers are known.
 
-    `found`: what old places and new ones have in common; `heirs`: the heirs, with the final numbers
-    of all new places; `areas_now`: the cells of each new place; `first`: the least number that no
-    old place has.
+    `overlaps`: what old places and new ones have in common; `heirs`: the heirs, with the final
+    numbers of all new places; `areas_now`: the cells of each new place; `first`: the least number
+    that no old place has.
     """
     kept = set(heirs.name.values())
-    old = sorted({place for place, _, _ in found})
+    old = sorted({place for place, _, _ in overlaps})
     died = [place for place in old if place not in kept]
     split: dict[int, list[int]] = {}
-    for place, new, cells in found:
+    for place, new, cells in overlaps:
         if new != NO_PLACE and 2 * cells > areas_now[new]:
             split.setdefault(place, []).append(heirs.name[new])
     return Events(
@@ -353,18 +322,3 @@ def events_of(
         {place: tuple(sorted(parts)) for place, parts in split.items() if len(parts) > 1},
         tuple(place for place in old if place in kept),
     )
-
-
-def _renumber(draft: CellDraft, name: dict[int, int]) -> None:
-    if not name:
-        return
-    tiles, rows = draft.tiles, draft.places.read([*name])
-    boxes = [Box(*around) for around in rows["box"].tolist()]
-    # A final number may be that of another place until now: all cells are found first.
-    masks = [tiles.planes(box)[0] == number for number, box in zip(name, boxes, strict=True)]
-    for final, box, mask in zip(name.values(), boxes, masks, strict=True):
-        planes = tiles.planes(box)
-        planes[0][mask] = final
-        tiles.put(box, planes)
-    draft.places.drop(name)
-    draft.places.write([*name.values()], rows)

@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.typing import BoolArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError, brief
-from hybridnav.ext.live.identities import settle, shift_of
+from hybridnav.ext.live.identities import NO_PLACE, Events, events_of, shift_of
 from hybridnav.ext.live.state import CellDraft, State, check_stated, patch_of, pyramid_of, state_of
 from hybridnav.ext.live.tiles import Box
 from hybridnav.maps import OccupancyGrid
@@ -21,6 +21,7 @@ from hybridnav.maps.checks import checked_cell, checked_type
 from hybridnav.pyramid import DualGraphPyramid, Linkage
 from hybridnav.pyramid.decimation import Criterion, squared_limit
 from hybridnav.pyramid.record import Patch
+from hybridnav.rooms.carrying import Heirs, Overlap, heirs_of
 
 
 @copies_alike
@@ -141,7 +142,7 @@ class OnlinePyramid:
         boxes = [*_outside(apart, whole), *([] if inside.is_empty else [inside])]
         draft = CellDraft(self.state, self._criterion)
         draft.change([part.moved(*low) for part in boxes], grid.classes, low)
-        events = settle(draft)
+        events = _settled(draft)
         cells = draft.cells - np.array(low)
         version = replace(self, grid=grid, low=low, state=draft.close())
         order = np.argsort(cells[:, 0] * grid.shape[1] + cells[:, 1], kind="stable")
@@ -192,8 +193,8 @@ class OnlinePyramid:
             )
         box = Box(*self.state.places.read([place])[0]["box"].tolist())
         cells = np.argwhere(self.state.tiles.planes(box)[0] == place)
-        found: LongArray = cells + np.array(box[:2]) - np.array(self.low)
-        return found
+        field: LongArray = cells + np.array(box[:2]) - np.array(self.low)
+        return field
 
     @cached_property
     def pyramid(self) -> DualGraphPyramid:
@@ -270,7 +271,6 @@ class Update:
     """
 
     version: OnlinePyramid
-    """The new version."""
     born: tuple[int, ...]
     """Places that are none of the old ones; their numbers are new."""
     died: tuple[int, ...]
@@ -313,3 +313,49 @@ def changed_cells(before: OccupancyGrid, after: OccupancyGrid) -> BoolArray:
     inside = np.s_[rows : rows + before.shape[0], cols : cols + before.shape[1]]
     changed[inside] = after.classes[inside] != before.classes
     return changed
+
+
+def _settled(draft: CellDraft) -> Events:
+    """Give the places of a draft the numbers of old ones as far as these have heirs.
+
+    See `heirs_of`. Most places bear their final numbers already.
+    """
+    first = draft.before.next_place
+    moved: list[list[int]] = draft.tiles.moved(draft.before.tiles).tolist()
+    areas = draft.before.places.areas(
+        sorted({place for overlap in moved for place in overlap[:2] if NO_PLACE < place < first})
+    )
+    stay = dict(areas)
+    overlaps: list[Overlap] = []
+    for old, went_to, cells in moved:
+        if old != NO_PLACE:
+            overlaps.append((old, went_to, cells))
+            stay[old] -= cells
+    overlaps += [(old, old, cells) for old, cells in stay.items() if cells > 0]
+    heirs = heirs_of(overlaps, areas)
+    name = dict(heirs.name)
+    new = {place for _, place, _ in overlaps} | set(draft.places.numbers(first))
+    for place in sorted(new - name.keys() - {NO_PLACE}):
+        name[place] = place
+        if place < first:
+            name[place] = draft.next_place
+            draft.next_place += 1
+    _renumber(draft, {place: final for place, final in name.items() if place != final})
+    now = draft.places.areas([*name.values()])
+    areas_now = {place: now[final] for place, final in name.items()}
+    return events_of(overlaps, Heirs(heirs.of, name), areas_now, first)
+
+
+def _renumber(draft: CellDraft, name: dict[int, int]) -> None:
+    if not name:
+        return
+    tiles, rows = draft.tiles, draft.places.read([*name])
+    boxes = [Box(*around) for around in rows["box"].tolist()]
+    # A final number may be that of another place until now: all cells are found first.
+    masks = [tiles.planes(box)[0] == number for number, box in zip(name, boxes, strict=True)]
+    for final, box, mask in zip(name.values(), boxes, masks, strict=True):
+        planes = tiles.planes(box)
+        planes[0][mask] = final
+        tiles.put(box, planes)
+    draft.places.drop(name)
+    draft.places.write([*name.values()], rows)

@@ -11,10 +11,11 @@ from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, LongArray
 from hybridnav.errors import InvalidValueError
+from hybridnav.ext.live.identities import NO_PLACE
 from hybridnav.ext.live.kernels import merging as _merge_kernels
 from hybridnav.ext.live.kernels.cells import take_out
 from hybridnav.ext.live.kernels.near import PlaceColumns, box_groups
-from hybridnav.ext.live.tiles import NO_PLACE, SIDE, Box, Differing, Tiles
+from hybridnav.ext.live.tiles import SIDE, Box, Differing, Tiles
 from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.contraction import Window
@@ -83,8 +84,8 @@ class PlaceTable:
         """Return those of some numbers that are places."""
         numbers = np.array([*places], np.int64)
         numbers = numbers[self._has(numbers)]
-        found: list[int] = numbers[self.read(numbers)["area"] > 0].tolist()
-        return found
+        used: list[int] = numbers[self.read(numbers)["area"] > 0].tolist()
+        return used
 
     def read(self, places: Sequence[int] | LongArray) -> AnyArray:
         """Return the rows of some places, `PLACE` (n,)."""
@@ -120,8 +121,8 @@ class PlaceTable:
     def numbers(self, first: int = 0) -> list[int]:
         """Return the numbers of all places from a first one on, ascending."""
         begin = int(np.searchsorted(self._numbers, first))
-        found: list[int] = self._numbers[begin:][self._rows["area"][begin:] > 0].tolist()
-        return found
+        used: list[int] = self._numbers[begin:][self._rows["area"][begin:] > 0].tolist()
+        return used
 
     def append(self, first: int, rows: AnyArray) -> LongArray:
         """Enter places with the numbers from one on that is above all others; return these."""
@@ -137,9 +138,9 @@ class PlaceTable:
     def _has(self, numbers: LongArray) -> BoolArray:
         at = np.searchsorted(self._numbers, numbers)
         inside = at < len(self._numbers)
-        found: BoolArray = inside.copy()
-        found[inside] = self._numbers[at[inside]] == numbers[inside]
-        return found
+        has: BoolArray = inside.copy()
+        has[inside] = self._numbers[at[inside]] == numbers[inside]
+        return has
 
     def _own(self, more: int = 0) -> None:
         """Copy what another version has too; make sure that there is space for more rows."""
@@ -247,16 +248,16 @@ def patch_of(before: State, now: State, box: Box, criterion: Criterion) -> Patch
 
     `box`: the cells of both grids among those of the tiles.
     """
-    lost, found = set[int](), set[int]()
+    lost, gained = set[int](), set[int]()
     for tile in now.tiles.differing_from(before.tiles):
         old, new = (of.tiles.planes(tile)[0] for of in (before, now))
         differs = old != new
         lost.update(np.unique(old[differs]).tolist())
-        found.update(np.unique(new[differs]).tolist())
+        gained.update(np.unique(new[differs]).tolist())
     numbers = np.intersect1d(before.places.numbers(), now.places.numbers())
     moved = (before.places.read(numbers)["cell"] != now.places.read(numbers)["cell"]).any(axis=1)
     lost.update(numbers[moved].tolist())
-    both = sorted((lost | found) - {NO_PLACE})  # a place whose cells differ is another one
+    both = sorted((lost | gained) - {NO_PLACE})  # a place whose cells differ is another one
     rows = [of.places.read(of.places.known(both)) for of in (before, now)]
     boxes = np.concatenate([each["box"] for each in rows])
     if not len(boxes):
@@ -306,31 +307,31 @@ class CellDraft:
 
         For the parameters see `Tiles.differing`.
         """
-        found = self.tiles.differing(boxes, classes, low)
-        self.cells = np.stack([found.row, found.col], axis=1)
-        if len(found.row):
-            for cells, box in self._groups(found):
+        differing = self.tiles.differing(boxes, classes, low)
+        self.cells = np.stack([differing.row, differing.col], axis=1)
+        if len(differing.row):
+            for cells, box in self._groups(differing):
                 self._move(cells, box)
 
-    def _groups(self, found: Differing) -> Iterator[tuple[Differing, Box]]:
+    def _groups(self, differing: Differing) -> Iterator[tuple[Differing, Box]]:
         """Yield changed cells that lie far enough from others, and a box round their places."""
-        box = self._box_round(found)
+        box = self._box_round(differing)
         if box.shape[0] * box.shape[1] <= _SMALL_CELLS:
-            yield found, box
+            yield differing, box
             return
-        places = sorted({*found.place.tolist()} - {NO_PLACE})
+        places = sorted({*differing.place.tolist()} - {NO_PLACE})
         boxes = self.places.read(places)["box"].astype(np.int64)
-        keys = ((found.row // SIDE) << 32) + found.col // SIDE
+        keys = ((differing.row // SIDE) << 32) + differing.col // SIDE
         _, first, index = np.unique(keys, return_index=True, return_inverse=True)
-        of_tiles = np.stack([found.row[first], found.col[first]], axis=1) // SIDE * SIDE
+        of_tiles = np.stack([differing.row[first], differing.col[first]], axis=1) // SIDE * SIDE
         joined = np.concatenate([boxes, np.hstack([of_tiles, of_tiles + SIDE])])
         group_of = box_groups(joined)
         of_cell = group_of[len(places) + index]
-        has = found.place >= 0
-        of_cell[has] = group_of[np.searchsorted(places, found.place[has])]
+        has = differing.place >= 0
+        of_cell[has] = group_of[np.searchsorted(places, differing.place[has])]
         for group in np.unique(of_cell).tolist():
             inside = of_cell == group
-            cells = Differing(*(values[inside] for values in found))
+            cells = Differing(*(values[inside] for values in differing))
             yield self._as_now(cells, Box(*joined[group].tolist()))
 
     def _as_now(self, cells: Differing, box: Box) -> tuple[Differing, Box]:
@@ -346,11 +347,11 @@ class CellDraft:
         boxes = np.concatenate([np.hstack([at, at + 1]), boxes])
         return Box(*boxes[:, :2].min(axis=0).tolist(), *boxes[:, 2:].max(axis=0).tolist())
 
-    def _move(self, found: Differing, box: Box) -> None:
+    def _move(self, differing: Differing, box: Box) -> None:
         """Move changed cells, and merge places that may merge then."""
         window = _Window(self, box.widened(1))
         first = self.next_place
-        waiting, lost, altered = window.take_out(found)
+        waiting, lost, altered = window.take_out(differing)
         joined, moved, boxes = _merge_kernels.let_join(
             window.planes,
             window.low,
@@ -403,21 +404,21 @@ class _Window:
         self.low = box[:2]
         self.planes = draft.tiles.planes(box)
 
-    def take_out(self, found: Differing) -> tuple[LongArray, LongArray, LongArray]:
+    def take_out(self, differing: Differing) -> tuple[LongArray, LongArray, LongArray]:
         """Take changed cells out of their places.
 
         Return flat cells that wait for a place, the places that lost cells, and those of them that
         have to be looked at again beside the new ones.
         """
         draft, places = self._draft, self._draft.places
-        cells = (found.row - self.low[0]) * self.box.shape[1] + found.col - self.low[1]
-        self.planes[1].ravel()[cells] = found.of_class
+        cells = (differing.row - self.low[0]) * self.box.shape[1] + differing.col - self.low[1]
+        self.planes[1].ravel()[cells] = differing.of_class
         parents, lost, altered = take_out(
-            self.planes[0], self.low, places.columns(), (cells, found.place), draft.next_place
+            self.planes[0], self.low, places.columns(), (cells, differing.place), draft.next_place
         )
         if len(parents):
             self._new(places.read(parents))
-        return cells[found.of_class > 0], lost, altered
+        return cells[differing.of_class > 0], lost, altered
 
     def _new(self, rows: AnyArray) -> LongArray:
         """Enter places with new numbers; return these."""

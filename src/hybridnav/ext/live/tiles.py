@@ -1,6 +1,4 @@
-"""Cells in square tiles that versions share: a change copies the tiles that it touches. Public:
-`NO_PLACE`.
-"""
+"""Cells in square tiles that versions share: a change copies the tiles that it touches."""
 
 from __future__ import annotations
 
@@ -12,15 +10,12 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike, frozen
 from hybridnav._base.typing import ByteArray, IntArray, LongArray
+from hybridnav.ext.live.identities import NO_PLACE
 from hybridnav.ext.live.kernels import tiles as _tile_kernels
 
 SIDE = 64
 """Rows and columns of a tile. A copy takes 3 us: larger tiles are beyond the size for which memory
 is taken anew from the system."""
-
-NO_PLACE = -1
-"""Number that stands for no place: that of occupied cells and of all outside the map."""
-
 
 _MANY = 16
 """Tiles that a kernel is called with at once."""
@@ -163,13 +158,13 @@ class Tiles:
         `boxes`: boxes on the map without common cells; `classes`: uint8 (rows, cols), `CellClass`
         of the cells of the map; `low`: row and column of its first cell.
         """
-        found, count = np.empty((_FEW_ROWS, 4), np.int64), 0
+        rows, count = np.empty((_FEW_ROWS, 4), np.int64), 0
         for box in boxes:
             for begin, tiles in self._groups_of(box):
-                found, count = _tile_kernels.find_differing(
-                    tiles, begin, box, (classes, low), found, count
+                rows, count = _tile_kernels.find_differing(
+                    tiles, begin, box, (classes, low), rows, count
                 )
-        row, col, place, of_class = found[:count].T.copy()
+        row, col, place, of_class = rows[:count].T.copy()
         return Differing(row, col, place, of_class.astype(np.uint8))
 
     def _groups_of(self, box: Box) -> Iterator[tuple[int, tuple[_Tiles, _Tiles]]]:
