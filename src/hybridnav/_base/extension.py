@@ -25,8 +25,8 @@ def extensions(group: str) -> dict[str, str]:
     `importlib.metadata` takes a tenth of a plan's time for it. It is asked where the files of
     installed packages lie in no folder, as in an archive.
     """
-    if (found := registered().get(f"[hybridnav.{group}]")) is not None:
-        return found
+    if (entries := registered().get(f"[hybridnav.{group}]")) is not None:
+        return entries
     from importlib.metadata import entry_points  # noqa: PLC0415
 
     return {one.name: one.value for one in entry_points(group=f"hybridnav.{group}")}
@@ -35,7 +35,7 @@ def extensions(group: str) -> dict[str, str]:
 @cache
 def registered() -> dict[str, dict[str, str]]:
     """Return what installed packages register in the groups of this one, by their titles."""
-    found: dict[str, dict[str, str]] = {}
+    groups: dict[str, dict[str, str]] = {}
     for folder in map(Path, sys.path):
         for file in folder.glob("*-info/entry_points.txt") if folder.is_dir() else ():
             title = ""
@@ -44,8 +44,8 @@ def registered() -> dict[str, dict[str, str]]:
                 title = name if name.startswith("[") else title
                 if equals and title.startswith("[hybridnav.") and not name.startswith("#"):
                     value = of.partition("[")[0].replace(" ", "")
-                    found.setdefault(title, {}).setdefault(name, value)
-    return found
+                    groups.setdefault(title, {}).setdefault(name, value)
+    return groups
 
 
 @cache
@@ -54,15 +54,15 @@ def extension(group: str, name: str) -> Any:
 
     Raises `InvalidValueError` when nothing is: this package was not installed whole.
     """
-    found = extensions(group).get(name)
-    if found is None:
+    target = extensions(group).get(name)
+    if target is None:
         raise InvalidValueError(
             f"nothing is registered as {name} in hybridnav.{group}: install hybridnav again"
         )
-    return resolve_name(found)
+    return resolve_name(target)
 
 
 def in_html(value: object) -> str | None:
     """Return what a notebook shows of a value, None where no pictures are registered."""
-    found = extensions("pictures").get("html")
-    return None if found is None else str(resolve_name(found)(value))
+    target = extensions("pictures").get("html")
+    return None if target is None else str(resolve_name(target)(value))

@@ -203,23 +203,23 @@ class Motion:
     def driven(self, spacing_m: float) -> Spread:
         """Return poses as `spread` does, also where lines and arcs meet, with two at each turn on
         the spot, also where lines without headings bend."""
-        found = self.spread(spacing_m, of_rate=True)
+        spread = self.spread(spacing_m, of_rate=True)
         if self.headings_rad is not None:
-            return found
-        yaw, moves = found.poses[:, 2], found.lengths_m > 0
+            return spread
+        yaw, moves = spread.poses[:, 2], spread.lengths_m > 0
         turn = wrapped(np.diff(yaw))
         at = 1 + np.flatnonzero((np.abs(turn[:-1]) > BEND) & moves[:-1] & moves[1:])
-        before = np.column_stack([found.poses[at, :2], yaw[at - 1]])
+        before = np.column_stack([spread.poses[at, :2], yaw[at - 1]])
         return Spread(
-            np.insert(found.poses, at, before, 0),
-            np.insert(found.directions, at, found.directions[at]),
-            np.insert(found.lengths_m, at, 0.0),
-            np.insert(found.turns_rad, at, turn[at - 1]),
+            np.insert(spread.poses, at, before, 0),
+            np.insert(spread.directions, at, spread.directions[at]),
+            np.insert(spread.lengths_m, at, 0.0),
+            np.insert(spread.turns_rad, at, turn[at - 1]),
         )
 
-    def _turned_at_ends(self, found: Spread) -> Spread:
+    def _turned_at_ends(self, spread: Spread) -> Spread:
         """Return poses with the turns on the spot at both ends."""
-        poses, ahead, lengths, turns = found
+        poses, ahead, lengths, turns = spread
         for end, heading in ((0, self.start_rad), (-1, self.goal_rad)):
             if heading is None:
                 continue

@@ -67,10 +67,10 @@ def stamp_of(module: str) -> str:
 
     numba asks for the module alone, and would run kept code of kernels that others changed.
     """
-    package, found, to_see = module.partition(".")[0], dict[str, bytes](), [module]
+    package, sources, to_see = module.partition(".")[0], dict[str, bytes](), [module]
     while to_see:
         name = to_see.pop()
-        if name not in found and name.partition(".")[0] == package:
-            found[name], imported = _source(name)
+        if name not in sources and name.partition(".")[0] == package:
+            sources[name], imported = _source(name)
             to_see += imported
-    return hashlib.sha256(b"".join(found[name] for name in sorted(found))).hexdigest()
+    return hashlib.sha256(b"".join(sources[name] for name in sorted(sources))).hexdigest()

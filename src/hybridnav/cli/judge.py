@@ -118,10 +118,10 @@ def judge(args: JudgeOptions) -> None:
         judged = [
             hn.judge(planner, each.points, times_s=each.times_s, costs=costs) for each in recorded
         ]
-    named = [(each.name, found) for each, found in zip(recorded, judged, strict=True)]
+    named = [(each.name, path) for each, path in zip(recorded, judged, strict=True)]
     _write(args, grid, named)
     if most is not None and any(
-        found.legal is not True or not found.loss_at_most <= most for _, found in named
+        path.legal is not True or not path.loss_at_most <= most for _, path in named
     ):
         raise typer.Exit(EXIT_NOT_SOLVED)
 
@@ -177,47 +177,47 @@ def _write(args: JudgeOptions, grid: hn.OccupancyGrid, named: list[tuple[str, Ju
         viz.save_figure(axes, args.plot)
 
 
-def _row(name: str, found: JudgedPath) -> Row:
+def _row(name: str, path: JudgedPath) -> Row:
     """Return the row of a table: metres, per cent, degrees and seconds."""
     row: dict[str, Any] = {
         "path": name,
-        "legal": {True: "yes", False: "no", None: "?"}[found.legal],
-        "contacts": len(found.contacts),
-        "depth m": max((each.depth_m for each in found.contacts), default=0.0),
-        "length m": found.length_m,
-        "optimum m": found.optimum_m[0] if math.isfinite(found.optimum_m[0]) else math.nan,
-        "loss %": 100 * found.loss,
-        "clearance m": found.clearance.least_m,
-        "turning deg": math.degrees(found.turning_rad),
+        "legal": {True: "yes", False: "no", None: "?"}[path.legal],
+        "contacts": len(path.contacts),
+        "depth m": max((each.depth_m for each in path.contacts), default=0.0),
+        "length m": path.length_m,
+        "optimum m": path.optimum_m[0] if math.isfinite(path.optimum_m[0]) else math.nan,
+        "loss %": 100 * path.loss,
+        "clearance m": path.clearance.least_m,
+        "turning deg": math.degrees(path.turning_rad),
     }
-    if found.duration_s is not None:
-        row |= {"seconds": found.duration_s, "m/s": found.mean_speed_m_s or math.nan}
-    if found.least_cost is not None:
-        cost = math.nan if found.cost is None else found.cost
+    if path.duration_s is not None:
+        row |= {"seconds": path.duration_s, "m/s": path.mean_speed_m_s or math.nan}
+    if path.least_cost is not None:
+        cost = math.nan if path.cost is None else path.cost
         row |= {
             "cost": cost,
-            "least cost": found.least_cost[0],
-            "cost loss %": 100 * found.cost_loss,
+            "least cost": path.least_cost[0],
+            "cost loss %": 100 * path.cost_loss,
         }
     return row
 
 
-def _lines(name: str, found: JudgedPath) -> list[str]:
+def _lines(name: str, path: JudgedPath) -> list[str]:
     """Return what a table has no room for."""
     lines = [
         f"{name}: contact, {each.what}, {each.depth_m:.3f} m deep at ({each.x:.2f}, {each.y:.2f}), "
         f"{each.from_m:.2f} to {each.to_m:.2f} m along"
-        for each in found.contacts[:_MOST_CONTACTS]
+        for each in path.contacts[:_MOST_CONTACTS]
     ]
-    if (left := len(found.contacts) - _MOST_CONTACTS) > 0:
+    if (left := len(path.contacts) - _MOST_CONTACTS) > 0:
         lines.append(f"{name}: {left} more contacts, in --json")
     lines += [
         f"{name}: loses {part.loss_m:.2f} m from ({part.start[0]:.2f}, {part.start[1]:.2f}) to "
         f"({part.end[0]:.2f}, {part.end[1]:.2f}), {part.from_m:.2f} to {part.to_m:.2f} m along"
-        for part in found.detours[:_MOST_DETOURS]
+        for part in path.detours[:_MOST_DETOURS]
     ]
-    if not found.optimum.solved:
-        lines.append(f"{name}: no optimum between its ends: {found.optimum.status}")
-    elif found.loss < 0:
+    if not path.optimum.solved:
+        lines.append(f"{name}: no optimum between its ends: {path.optimum.status}")
+    elif path.loss < 0:
         lines.append(f"{name}: shorter than every path of the disc, as it is none")
     return lines

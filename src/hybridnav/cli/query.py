@@ -178,11 +178,11 @@ class PlanOptions(FloorOptions):
     @property
     def shut(self) -> list[str]:
         """What the query closes, and lets pass one way, as `--blocked` takes it."""
-        found = list(self.blocked or ())
+        closing = list(self.blocked or ())
         for text in self.one_way or ():
             floor, colon, rest = text.partition(":") if self.is_building else ("", "", text)
-            found.append(f"{floor}{colon}one-way:{rest}")
-        return found
+            closing.append(f"{floor}{colon}one-way:{rest}")
+        return closing
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,14 @@ from hybridnav._base.rows import in_runs
 from hybridnav._base.typing import LongArray
 from hybridnav.closures.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
 from hybridnav.closures.ids import arc_on, door_on, found_ids
-from hybridnav.closures.one_way import OneWay, OneWayLike, as_one_way, joined
+from hybridnav.closures.one_way import (
+    OneWay,
+    OneWayLike,
+    as_one_way,
+    checked_named,
+    joined,
+    joined_named,
+)
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import LevelArc
@@ -104,7 +111,7 @@ class Blocked:
             "keepout": _checked_areas("keepout", self.keepout),
             "doors": _checked_ids("doors", self.doors, Door),
             "rooms": _checked_names(self.rooms),
-            "named": _checked_named(self.named),
+            "named": checked_named(self.named, Blocked),
             "one_way": None if self.one_way is None else as_one_way(self.one_way),
         }
         for name, value in checked.items():
@@ -120,9 +127,7 @@ class Blocked:
             if one.name not in {"cells", "named", "one_way"}
         }
         cells = np.concatenate([np.asarray(self.cells), np.asarray(other.cells)])
-        named = {**self.named, **other.named}
-        for name in self.named.keys() & other.named.keys():
-            named[name] = self.named[name] | other.named[name]
+        named = joined_named(self.named, other.named)
         one_way = joined([self.one_way, other.one_way])
         return Blocked(**both, cells=cells, named=named, one_way=one_way)
 
@@ -176,14 +181,14 @@ class Blocked:
     def cells_on(self, grid: OccupancyGrid, topology: TopologicalMap | None) -> LongArray:
         """Find the cells as `cells_of` does, on a grid whose places may not be built: None."""
         cells = _inside(np.asarray(self.cells), grid.shape)
-        found = [cells[:, 0] * grid.shape[1] + cells[:, 1]]
-        found += [one.cells_on(grid, topology) for one in self.named.values()]
+        closed = [cells[:, 0] * grid.shape[1] + cells[:, 1]]
+        closed += [one.cells_on(grid, topology) for one in self.named.values()]
         if self.arcs or self.places or self.doors or self.rooms:
             if topology is None:
                 no_places()
-            found += self._in_places(topology) + self._in_rooms(topology)
-            found += self._on_boundaries(topology)
-        single = np.concatenate(found)
+            closed += self._in_places(topology) + self._in_rooms(topology)
+            closed += self._on_boundaries(topology)
+        single = np.concatenate(closed)
         if not (self.polygons or self.keepout):  # rooms have many cells, and need no runs
             return np.unique(single)
         runs = [np.stack([single, single + 1], axis=1)]
@@ -197,9 +202,9 @@ class Blocked:
         without any."""
         areas = cast("Sequence[BaseGeometry]", self.polygons)
         runs = [runs_near(area, grid, radius_m=0.0) for area in areas]
-        found = [one.solid_on(grid) for one in self.named.values()]
-        found.append(_cells_in_runs(np.concatenate(runs)) if runs else None)
-        solid = [cells for cells in found if cells is not None]
+        closed = [one.solid_on(grid) for one in self.named.values()]
+        closed.append(_cells_in_runs(np.concatenate(runs)) if runs else None)
+        solid = [cells for cells in closed if cells is not None]
         return np.unique(np.concatenate(solid)) if solid else None
 
     def _in_places(self, topology: TopologicalMap) -> list[LongArray]:
@@ -296,14 +301,6 @@ def _checked_names(names: Any) -> tuple[str, ...]:
     if not all(isinstance(name, str) for name in given):
         raise InvalidValueError(f"rooms must be a sequence of names, got {shown(names)}")
     return tuple(map(str, given))
-
-
-def _checked_named(named: Any) -> dict[str, Blocked]:
-    if not isinstance(named, Mapping) or not all(
-        isinstance(name, str) and isinstance(one, Blocked) for name, one in named.items()
-    ):
-        raise InvalidValueError(f"named must be a mapping of names to Blocked, got {shown(named)}")
-    return dict(named)
 
 
 def _checked_areas(name: str, areas: Any) -> tuple[BaseGeometry, ...]:

@@ -62,7 +62,6 @@ class OutOfOrder:
     """When it was closed, UTC."""
     why: str = ""
     by: str = ""
-    """Who closed it."""
 
     def __post_init__(self) -> None:
         """Refuse what names nothing."""
@@ -80,9 +79,9 @@ class OutOfOrder:
 
     @property
     def _parts(self) -> dict[str, str | None]:
-        found = _WHAT.fullmatch(self.what)
-        assert found is not None  # noqa: S101 - it was checked
-        return found.groupdict()
+        match = _WHAT.fullmatch(self.what)
+        assert match is not None  # noqa: S101 - it was checked
+        return match.groupdict()
 
     @property
     def link(self) -> str | None:
@@ -122,7 +121,6 @@ class OutOfOrder:
 
 
 def _mark(state: os.stat_result) -> tuple[int, int, int]:
-    """Return what tells one file of a name from the next."""
     return state.st_ino, state.st_mtime_ns, state.st_size
 
 

@@ -99,7 +99,6 @@ def load_blocked(
 
 
 def _closing(cells: BoolArray, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
-    """Return the closure of some cells, as obstacles or for the centre of the robot."""
     radius_m = 0.0 if keepout else grid.robot_radius_m
     return Blocked(
         cells=np.argwhere(within_radius(cells, radius_cells=radius_m / grid.resolution_m))
@@ -132,7 +131,7 @@ def _image(path: PathLike, grid: OccupancyGrid, *, keepout: bool) -> Blocked:
 
 def _areas(path: PathLike, grid: OccupancyGrid) -> list[BaseGeometry]:
     where = f"blocked {printable(path)}"
-    found: list[BaseGeometry] = []
+    areas: list[BaseGeometry] = []
     outline_cells = 0.0
     for at, geometry in _geometries(_read_json(path, where), where):
         area = _area(geometry, at)
@@ -146,10 +145,10 @@ def _areas(path: PathLike, grid: OccupancyGrid) -> list[BaseGeometry]:
                 f"{at}: outlines of {outline_cells:.0f} cells on the map, at most "
                 f"{_MOST_OUTLINE_CELLS} are read: leave out detail, or paint a mask image"
             )
-        found.append(area)
-    if not found:
+        areas.append(area)
+    if not areas:
         raise MapError(f"{where}: closes nothing, expected at least one feature")
-    return found
+    return areas
 
 
 def _outline_cells(parts: list[BaseGeometry], grid: OccupancyGrid) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from functools import reduce
 from itertools import pairwise
 from operator import or_
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import shapely
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from hybridnav.maps import Frame, OccupancyGrid, OneWayRule
     from hybridnav.topology import TopologicalMap
 
+_T = TypeVar("_T")
 _FARTHEST_CELLS = 1e6
 """Cells from the map's origin beyond which the points of a line count as a mistake."""
 
@@ -91,7 +92,7 @@ class OneWay:
             "doors": _checked_pairs("doors", self.doors, (int, Door), (str, type(None))),
             "arcs": _checked_pairs("arcs", self.arcs, (int, LevelArc), (int,)),
             "sides": _checked_sides(self.sides),
-            "named": _checked_named(self.named),
+            "named": checked_named(self.named, OneWay),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -111,11 +112,8 @@ class OneWay:
             name: (*getattr(self, name), *getattr(other, name))
             for name in ("lines", "doors", "arcs")
         }
-        named = {**self.named, **other.named}
-        for name in self.named.keys() & other.named.keys():
-            named[name] = self.named[name] | other.named[name]
         sides = np.concatenate([np.asarray(self.sides), np.asarray(other.sides)])
-        return OneWay(**both, sides=sides, named=named)
+        return OneWay(**both, sides=sides, named=joined_named(self.named, other.named))
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -288,16 +286,16 @@ def _sides_of_door(topology: TopologicalMap, door: Door, room: str | None) -> Lo
 
 
 def _sides_of_arc(topology: TopologicalMap, arc: int | LevelArc, place: int) -> LongArray:
-    found = arc_on(topology, arc)
-    level = topology.pyramid[found.level]
-    ends = level.arcs[found.index].tolist()
+    located = arc_on(topology, arc)
+    level = topology.pyramid[located.level]
+    ends = level.arcs[located.index].tolist()
     shown_ends = ends if isinstance(arc, LevelArc) else topology.place_ids[ends].tolist()
     if ends[0] == ends[1] or place not in shown_ends:
         raise InvalidValueError(
             f"{arc if isinstance(arc, LevelArc) else f'arc {arc}'} joins {shown_ends[0]} and "
             f"{shown_ends[1]}, and has no direction into {place}: name one of two places"
         )
-    pairs = level.boundary(found.index).reshape(-1, 4)
+    pairs = level.boundary(located.index).reshape(-1, 4)
     return pairs if place == shown_ends[1] else pairs[:, [2, 3, 0, 1]]
 
 
@@ -332,7 +330,7 @@ def _checked_line(line: Any) -> FloatArray:
 def _checked_pairs(
     name: str, pairs: Any, firsts: tuple[type, ...], seconds: tuple[type, ...]
 ) -> tuple[tuple[Any, Any], ...]:
-    found = []
+    checked = []
     for pair in _listed(name, pairs):
         is_pair = isinstance(pair, Sequence) and not isinstance(pair, str) and len(pair) == 2  # noqa: PLR2004
         one, into = pair if is_pair else (None, None)
@@ -344,8 +342,8 @@ def _checked_pairs(
                 f"{name} must be pairs of what has a direction and where it leads into, as "
                 f"{example}, got {shown(pair)}"
             )
-        found.append((one, into))
-    return tuple(found)
+        checked.append((one, into))
+    return tuple(checked)
 
 
 def _checked_sides(sides: Any) -> IntArray:
@@ -373,9 +371,17 @@ def _checked_sides(sides: Any) -> IntArray:
     return frozen(rows.astype(np.int32))
 
 
-def _checked_named(named: Any) -> dict[str, OneWay]:
+def checked_named(named: Any, kind: type[_T]) -> dict[str, _T]:
+    """Return a mapping of names to closures, checked."""
     if not isinstance(named, Mapping) or not all(
-        isinstance(name, str) and isinstance(one, OneWay) for name, one in named.items()
+        isinstance(name, str) and isinstance(each, kind) for name, each in named.items()
     ):
-        raise InvalidValueError(f"named must be a mapping of names to OneWay, got {shown(named)}")
+        expected = f"named must be a mapping of names to {kind.__name__}"
+        raise InvalidValueError(f"{expected}, got {shown(named)}")
     return dict(named)
+
+
+def joined_named(first: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the closures of two mappings, those of one name joined."""
+    both = {name: each | other[name] for name, each in first.items() if name in other}
+    return {**first, **other, **both}

@@ -46,9 +46,7 @@ class GraphCheck:
     """
 
     grid: OccupancyGrid
-    """The map."""
     graph: WaypointGraph
-    """The graph."""
     findings: tuple[Finding, ...]
     """The findings, empty if nothing is wrong."""
     is_free: BoolArray

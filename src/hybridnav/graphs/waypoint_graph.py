@@ -47,7 +47,6 @@ class WaypointGraph:
     """
 
     name: str
-    """Name of the graph."""
     format: str
     """Where it is from: nav2, strands, strands-text, tmap2, graphml, gml, node-link, networkx, rmf,
     osm, lif, indoorgml, or hybridnav for the graph of a map."""
@@ -212,7 +211,6 @@ class RouteGraph:
     """
 
     grid: OccupancyGrid
-    """The map."""
     positions: FloatArray
     """float64 (n, 2), (row, col) of each node in grid units."""
     kinds: tuple[str, ...]

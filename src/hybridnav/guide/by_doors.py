@@ -75,11 +75,11 @@ class Track:
         """
         if self.cost_m <= 0:
             return 1.0
-        known = set(other._keys)
+        other_keys = set(other._keys)
         begin, common_m, apart = 0.0, 0.0, []
         for key, length_m in zip(self._keys, self._lengths_m, strict=True):
             end = begin + length_m
-            if key in known:
+            if key in other_keys:
                 common_m += length_m if self._costs is None else self._between(begin, end)
             else:
                 apart.append(substring(self._line, begin, end))
@@ -188,7 +188,6 @@ class DoorTours:
         return [one for one, _ in chosen]
 
     def _track(self, tour: Tour) -> Track:
-        """Return the line of a tour, measured as its planner plans."""
         layer = self._planner.costs
         costs = None if layer is None else (self._planner.grid, layer)
         return Track(tour, self.near_m, costs=costs)
@@ -266,9 +265,9 @@ class DoorTours:
         numbers = [None, *(None if door is None else door.number for door in doors), None]
         labels = self._rooms.label_of_vertex[list(route.vertices)].tolist()
         names = map(self._rooms.name_of, labels)
-        known = set(keys_of_legs(tour.legs))
+        tour_keys = set(keys_of_legs(tour.legs))
         keys = zip(numbers, names, numbers[1:], strict=False)
-        common = (leg for key, leg in zip(keys, route.legs_m, strict=True) if key in known)
+        common = (leg for key, leg in zip(keys, route.legs_m, strict=True) if key in tour_keys)
         return sum(common) / route.length_m if route.length_m > 0 else 1.0
 
     def _used(self, arcs: Sequence[int]) -> BoolArray:
@@ -276,14 +275,14 @@ class DoorTours:
         graph, doors = self._graph, self._rooms.door_of_arc
         chosen = np.isin(graph.arcs, list(arcs))
         pairs = np.sort(graph.endpoints, axis=1)
-        known = {
+        used = {
             (*pairs[at].tolist(), doors[arc].number)
             for at, arc in zip(np.flatnonzero(chosen).tolist(), graph.arcs[chosen], strict=True)
             if arc in doors
         }
         return chosen | np.array(
             [
-                arc in doors and (*pair, doors[arc].number) in known
+                arc in doors and (*pair, doors[arc].number) in used
                 for arc, pair in zip(graph.arcs.tolist(), pairs.tolist(), strict=True)
             ],
             dtype=np.bool_,

@@ -98,8 +98,8 @@ class FoundMethod:
         if callable(prepare := getattr(method, "prepare", None)):
             prepare()
         cells = int((grid.classes == CellClass.FREE).sum())
-        known = {"n_nodes": cells, "n_edges": 0, "memory_bytes": 0, "version": "", "settings": ""}
-        for name, default in {"name": type(method).__name__, **known}.items():
+        usual = {"n_nodes": cells, "n_edges": 0, "memory_bytes": 0, "version": "", "settings": ""}
+        for name, default in {"name": type(method).__name__, **usual}.items():
             setattr(self, name, getattr(method, name, default))
         self.region_of: IntArray | None = None
 
@@ -112,20 +112,20 @@ class FoundMethod:
     def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Plan between two free cells."""
         ends = self._frame.points_of(np.array([start, goal]))
-        found = self._method.find(search.Query((start, goal), (ends[0], ends[1])))
-        stats, cost_m, least_m = found.stats, found.cost_m, found.lower_bound_m
-        counts = _counts(stats) | {"seconds": stats.seconds, "proof": found.proof}
-        if not found.has_path:
+        answer = self._method.find(search.Query((start, goal), (ends[0], ends[1])))
+        stats, cost_m, least_m = answer.stats, answer.cost_m, answer.lower_bound_m
+        counts = _counts(stats) | {"seconds": stats.seconds, "proof": answer.proof}
+        if not answer.has_path:
             gave_up = "" if math.isinf(least_m) else "no path, and no proof of none"
             return MethodResult(None, gave_up=gave_up, **counts)
-        if self._method.metric == "any-angle" and found.points is not None:
-            line = AnyAngleResult(found.points, cost_m, lower_bound_m=least_m)
+        if self._method.metric == "any-angle" and answer.points is not None:
+            line = AnyAngleResult(answer.points, cost_m, lower_bound_m=least_m)
             return MethodResult(None, any_angle=line, **counts)
         if self._method.metric == "weighted":
             claim = CostClaim(cost_m, least_m)
-            return MethodResult(found.cells, by_costs=claim, **counts)
+            return MethodResult(answer.cells, by_costs=claim, **counts)
         bound = cost_m / least_m if least_m > 0 else math.inf
-        return MethodResult(found.cells, bound=bound if cost_m > 0 else 1.0, **counts)
+        return MethodResult(answer.cells, bound=bound if cost_m > 0 else 1.0, **counts)
 
     def close(self) -> None:
         """End the processes of the method."""

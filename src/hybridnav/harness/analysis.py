@@ -70,10 +70,10 @@ class Study:
         parts: dict[str, list[FloatArray]] = {}
         for outcome in self.outcomes:
             if outcome.is_asked and not outcome.has_plans_alone:
-                found = outcome.losses_over(optimum)[outcome.among(self.common)]
-                parts.setdefault(outcome.label, []).append(found)
-        known = {label: np.concatenate(losses) for label, losses in parts.items()}
-        return {label: losses for label, losses in known.items() if np.isfinite(losses).any()}
+                own = outcome.losses_over(optimum)[outcome.among(self.common)]
+                parts.setdefault(outcome.label, []).append(own)
+        joined = {label: np.concatenate(losses) for label, losses in parts.items()}
+        return {label: losses for label, losses in joined.items() if np.isfinite(losses).any()}
 
     @cached_property
     def table(self) -> Table:
@@ -134,9 +134,9 @@ class Study:
         """How many of the any-angle optima an independent search confirmed, "3 of 16"; empty if
         there are none."""
         records = [r for outcome in self.of_method(REFERENCE) for r in outcome.records]
-        known = [record for record in records if "any_angle_m" in record]
-        checked = sum("visibility_optimum_m" in record for record in known)
-        return f"{checked:,} of {len(known):,}" if known else ""
+        measured = [record for record in records if "any_angle_m" in record]
+        checked = sum("visibility_optimum_m" in record for record in measured)
+        return f"{checked:,} of {len(measured):,}" if measured else ""
 
     @property
     def faults(self) -> list[tuple[Outcome, Record, str]]:
@@ -376,7 +376,7 @@ def _left_out(
 ) -> list[str]:
     """Return in words the answers that no table shows, a sentence for each method."""
     current = {(who_of(record), sha) for (sha, _), record in shown.items()}
-    found: dict[str, list[str]] = {}
+    counts_of: dict[str, list[str]] = {}
     for key, record in preparations.items():
         if key not in shown:
             method, sha = record["method"], key[0]
@@ -384,10 +384,10 @@ def _left_out(
             made_of = made_by if made_by == method else f"{made_by} ({method})"
             again = "asked again" if (who_of(record), sha) in current else "not asked again"
             count = f"{len(pairs.get(key, ())):,} on {names[sha]} ({again})"
-            found.setdefault(made_of, []).append(count)
+            counts_of.setdefault(made_of, []).append(count)
     return [
         f"Left out, because class {made_of} was changed after them: answers {', '.join(counts)}."
-        for made_of, counts in found.items()
+        for made_of, counts in counts_of.items()
     ]
 
 
@@ -400,9 +400,9 @@ def _metric_of(
     """
     costs = {str(record.get("costs", "")) for record in preparations.values()}
     if len(costs) > 1:
-        known = ", ".join(repr(text) for text in sorted(costs))
+        texts = ", ".join(repr(text) for text in sorted(costs))
         raise InvalidValueError(
-            f"run {folder} has records with different costs, {known}: take a folder for each"
+            f"run {folder} has records with different costs, {texts}: take a folder for each"
         )
     if metric == "weighted" and costs == {""}:
         raise InvalidValueError(

@@ -151,10 +151,10 @@ def consistency_row(outcomes: Sequence[Outcome]) -> Row:
     for outcome in outcomes:
         for record in (outcome.preparation, *outcome.records):
             reference = outcome.optimum.get(query_key(record)) if "start" in record else None
-            found: set[Kind] = set(record.get("fault_kinds", ()))
-            wrong.update(found)
-            checked.update(_checked(record, reference) | found)
-            rightly += record["status"] == "no path" and "no path" not in found
+            kinds: set[Kind] = set(record.get("fault_kinds", ()))
+            wrong.update(kinds)
+            checked.update(_checked(record, reference) | kinds)
+            rightly += record["status"] == "no path" and "no path" not in kinds
     row: Row = {}
     for kind in KINDS:
         row[WRONGLY if kind == "no path" else kind] = _share(wrong[kind], checked[kind])

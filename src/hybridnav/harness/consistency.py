@@ -183,8 +183,8 @@ class Consistency:
         lengths = np.sqrt(rows + cols)
         graph = sparse.coo_array((lengths, (tail, head)), (base, base)).tocsr()
         first, last = start[0] * self._cols + start[1], goal[0] * self._cols + goal[1]
-        found = csgraph.dijkstra(graph, indices=np.searchsorted(cells[0], [first]))[0]
-        return float(found[base - len(cells[-1]) + np.searchsorted(cells[-1], last)])
+        distances = csgraph.dijkstra(graph, indices=np.searchsorted(cells[0], [first]))[0]
+        return float(distances[base - len(cells[-1]) + np.searchsorted(cells[-1], last)])
 
     def _between(self, one: int, other: int) -> LongArray:
         """Return the moves between two regions, or inside one, each in one direction."""
@@ -223,8 +223,8 @@ class Consistency:
     def _linked(self, pairs: IntArray) -> BoolArray:
         keys = self._keys(pairs)
         at = np.minimum(np.searchsorted(self._links, keys), max(len(self._links) - 1, 0))
-        found = self._links[at] == keys if len(self._links) else np.zeros(len(keys), np.bool_)
-        return found | (pairs[:, 0] == pairs[:, 1])
+        linked = self._links[at] == keys if len(self._links) else np.zeros(len(keys), np.bool_)
+        return linked | (pairs[:, 0] == pairs[:, 1])
 
     def joined(self, start: Cell, goal: Cell) -> bool:
         """Return whether the metric layer joins two cells, by scipy's connected components."""

@@ -96,22 +96,22 @@ class NamedMethod:
     and `frame`, see `load_paths`."""
 
 
-def baseline_name(name: str, known: Iterable[str]) -> str:
+def baseline_name(name: str, choices: Iterable[str]) -> str:
     """Return the baseline of a name or an alias, such as "hpa-star" of "HPA*".
 
     Raises `InvalidValueError` when there is none; the message names those that look like it.
     """
     plain = "-".join(name.lower().replace("*", "-star").split()).replace("--", "-")
-    found = ALIASES.get(plain, plain)
-    names = list(known)
-    if found in names:
-        return found
-    if found in _RIVALS:
+    current = ALIASES.get(plain, plain)
+    names = list(choices)
+    if current in names:
+        return current
+    if current in _RIVALS:
         raise InvalidValueError(
-            f"baseline {found} is no longer in the package: in a checkout write "
-            f"benchmarks.{_RIVALS[found]}, or give a class of your own as module:class"
+            f"baseline {current} is no longer in the package: in a checkout write "
+            f"benchmarks.{_RIVALS[current]}, or give a class of your own as module:class"
         )
-    near = difflib.get_close_matches(found, [*names, *ALIASES], n=1)
+    near = difflib.get_close_matches(current, [*names, *ALIASES], n=1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     raise InvalidValueError(
         f"no baseline is called {brief(name)}{hint}: there are {', '.join(names)}, or module:class"

@@ -127,11 +127,11 @@ def load_paths(  # noqa: PLR0913 - all but two have defaults
     if not file.exists():
         raise MapNotFoundError(f"{where}: no such file")
     suffix = file.suffix.lower()
-    found: Iterator[RecordedPath]
+    recorded: Iterator[RecordedPath]
     if file.is_dir() or suffix in _BAGS:
         read = extension("formats", "bag").bag_paths
         each = read(file, topic=topic, frame=frame)
-        found = (RecordedPath(name, *rest) for name, *rest in each)
+        recorded = (RecordedPath(name, *rest) for name, *rest in each)
     else:
         read = {".csv": _table, ".npy": _array, ".geojson": _lines, ".json": _lines}.get(
             suffix, _lines if suffix.endswith("jsonl") else _text
@@ -139,12 +139,12 @@ def load_paths(  # noqa: PLR0913 - all but two have defaults
         try:
             if file.stat().st_size > _MOST_BYTES:
                 raise MapError(f"{where}: expected at most {_MOST_BYTES} bytes: split it")
-            found = iter(read(file, where, columns))
+            recorded = iter(read(file, where, columns))
         except (OSError, ValueError, LookupError, csv.Error, RecursionError) as error:
             if isinstance(error, MapError):
                 raise
             raise MapError(f"{where}: cannot be read: {error!s:.100}") from None
-    read_paths = tuple(_placed(each, grid, unit, where) for each in found)
+    read_paths = tuple(_placed(each, grid, unit, where) for each in recorded)
     if not read_paths:
         raise MapError(f"{where}: no path in it, expected one at least")
     return read_paths
@@ -260,7 +260,7 @@ def _parts(name: str) -> list[str]:
 
 
 def _chosen(names: list[str], where: str) -> list[int]:
-    found = []
+    own_columns = []
     for axis in "xy":
         own = [k for k, name in enumerate(names) if _parts(name)[-1:] == [axis]]
         own = own or [k for k, name in enumerate(names) if _parts(name)[-2:] == [axis, "m"]]
@@ -268,28 +268,28 @@ def _chosen(names: list[str], where: str) -> list[int]:
             k for k, name in enumerate(names) if name.lower() in {f"pos{axis}", f"p{axis}"}
         ]
         exact = [k for k in own if "position" in _parts(names[k]) or "pos" in _parts(names[k])]
-        found.append(own if len(own) == 1 else exact)
-    if any(len(own) != 1 for own in found):
+        own_columns.append(own if len(own) == 1 else exact)
+    if any(len(own) != 1 for own in own_columns):
         raise MapError(
             f"{where}: no one column is x, and one y, of {brief(names)}: state --columns, their "
             "names and that of the times"
         )
     times = [k for k, name in enumerate(names) if set(_parts(name)[-2:]) & _TIMES]
-    return [found[0][0], found[1][0], *(times if len(times) == 1 else [])]
+    return [own_columns[0][0], own_columns[1][0], *(times if len(times) == 1 else [])]
 
 
 def _named(names: list[str], columns: Sequence[str], where: str) -> list[int]:
     """Return the columns that are named, or numbered from 1."""
     numbers = {str(number + 1): number for number in range(len(names))}
-    found = [
+    picked = [
         names.index(name) if name in names else numbers.get(name) for name in map(str, columns)
     ]
-    if len(found) not in {2, 3} or None in found:
+    if len(picked) not in {2, 3} or None in picked:
         raise MapError(
             f"{where}: columns are {brief(list(columns))}, expected x, y and perhaps times of "
             f"{brief(names)}: name them"
         )
-    return [number for number in found if number is not None]
+    return [number for number in picked if number is not None]
 
 
 def _array(file: Path, where: str, columns: Sequence[str] | None) -> list[RecordedPath]:
@@ -311,10 +311,10 @@ def _lines(file: Path, where: str, columns: Sequence[str] | None) -> list[Record
     del columns
     text = file.read_text("utf-8-sig")
     each = text.splitlines() if file.suffix.lower().endswith("jsonl") else [text]
-    found = [one for part in each if part.strip() for one in _coordinates(json.loads(part))]
-    names = [file.stem] if len(found) == 1 else [f"{file.stem} {k + 1}" for k in range(len(found))]
+    rows = [one for part in each if part.strip() for one in _coordinates(json.loads(part))]
+    names = [file.stem] if len(rows) == 1 else [f"{file.stem} {k + 1}" for k in range(len(rows))]
     try:
-        lines = [np.array([point[:2] for point in line], dtype=np.float64) for line in found]
+        lines = [np.array([point[:2] for point in line], dtype=np.float64) for line in rows]
     except (TypeError, ValueError):
         raise MapError(f"{where}: expected LineStrings of positions [x, y]: mend it") from None
     return list(map(RecordedPath, names, lines))
@@ -340,10 +340,10 @@ def _text(file: Path, where: str, columns: Sequence[str] | None) -> list[Recorde
     lines = [line.strip() for line in file.read_text("utf-8-sig").splitlines()]
     rows = [line.split() for line in lines if line and not line.startswith("#")]
     if rows and all(_PAIR.search(line) for line in lines if line):
-        found = [[(float(a), float(b)) for a, b in _PAIR.findall(line)] for line in lines if line]
+        cells = [[(float(a), float(b)) for a, b in _PAIR.findall(line)] for line in lines if line]
         return [
             RecordedPath(f"{file.stem}{_OF_LIST}{k}", np.array(each))
-            for k, each in enumerate(found)
+            for k, each in enumerate(cells)
         ]
     width = len(rows[0]) if rows else 0
     if width not in {8, 12} or any(len(row) != width for row in rows):

@@ -91,7 +91,6 @@ class JudgedPath:
     least_cost: tuple[float, float] | None
     """Proved bounds on the least cost between its ends, as `optimum_m`."""
     planner: HybridPlanner
-    """The planner of `optimum`."""
 
     @property
     def loss(self) -> float:
@@ -132,13 +131,13 @@ class JudgedPath:
         lost = np.diff(at) + np.diff(left)
         loses = lost > _LEAST_SHARE * np.diff(at)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], loses, [False]]).astype(np.int8)))
-        found = []
+        detours = []
         for low, high in edges.reshape(-1, 2).tolist():
             loss_m = float(lost[low:high].sum())
             if loss_m >= max(_LEAST_M, _LEAST_SHARE * self.optimum_m[1]):
                 ends = (tuple(places[k].tolist()) for k in (low, high))
-                found.append(Detour(float(at[low]), float(at[high]), loss_m, *ends))
-        return tuple(sorted(found, key=lambda part: -part.loss_m))
+                detours.append(Detour(float(at[low]), float(at[high]), loss_m, *ends))
+        return tuple(sorted(detours, key=lambda part: -part.loss_m))
 
     def part(self, from_m: float, to_m: float) -> FloatArray:
         """Return the points of a part of the path, float64 (k, 2).
@@ -280,11 +279,11 @@ def _costs(costs: HybridPlanner, xy: FloatArray) -> tuple[float | None, tuple[fl
             f"costs is a planner of preset {costs.preset.name}, which has none: take one by costs, "
             "such as preset robot"
         )
-    found = costs.plan(xy[0], xy[-1])
+    optimum = costs.plan(xy[0], xy[-1])
     cells, shape = costs.grid.frame.positions_of(xy), costs.grid.shape
     is_on = bool(((cells >= 0) & (cells <= shape)).all())
     cost = cost_along(costs.grid, costs.costs, xy) if is_on else None
-    return cost, (found.lower_bound, found.cost)
+    return cost, (optimum.lower_bound, optimum.cost)
 
 
 def _timed(

@@ -63,7 +63,7 @@ def fault_fields(faults: Iterable[Fault]) -> Record:
     of_kind: dict[str, list[str]] = {}
     for kind, text in faults:
         of_kind.setdefault(kind, []).append(text)
-    texts = ["; ".join(found) for found in of_kind.values()]
+    texts = ["; ".join(each) for each in of_kind.values()]
     return {"faults": texts, **({"fault_kinds": list(of_kind)} if texts else {})}
 
 
@@ -291,11 +291,11 @@ def _lay_contradiction(record: Record, reference: Record | None) -> None:
     """
     texts = record.get("faults", ())
     usual: Kind = "regions" if record["type"] == "preparation" else "paths"
-    found = list(map(Fault, record.get("fault_kinds") or [usual] * len(texts), texts))
+    faults = list(map(Fault, record.get("fault_kinds") or [usual] * len(texts), texts))
     wrong = None if reference is None else contradiction(record, reference)
-    if wrong is not None and wrong.kind not in {fault.kind for fault in found}:
-        found.append(wrong)
-    record |= fault_fields(found)
+    if wrong is not None and wrong.kind not in {fault.kind for fault in faults}:
+        faults.append(wrong)
+    record |= fault_fields(faults)
 
 
 # One for each direction, counter-clockwise from east; anything else is written as cells.

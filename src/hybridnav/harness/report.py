@@ -191,7 +191,6 @@ class ReportData:
     warnings: list[str] = field(default_factory=list)
     """What speaks against the times."""
     definition: str = ""
-    """What consistency is."""
     meanings: list[tuple[str, str]] = field(default_factory=list)
     """What each column of the tables holds."""
     overall_losses: Losses = field(default_factory=dict)
@@ -260,17 +259,17 @@ def counter_examples(study: Study, drawn: dict[CaseKey, str]) -> list[CounterExa
         for rank, (record, text) in enumerate(outcome.faults)
     ]
     ranked.sort(key=lambda fault: fault[0])
-    found = [(outcome, record, text) for _, outcome, record, text in ranked]
+    cases = [(outcome, record, text) for _, outcome, record, text in ranked]
     lines = [
         CounterExample(
             f"{outcome.map_name}, {outcome.label}, {_pair_text(record)}: {text}",
             command=command_of(outcome, record),
             anchor=drawn.get((outcome.label, record["id"], text), ""),
         )
-        for outcome, record, text in found[:MAX_FAULTS_SHOWN]
+        for outcome, record, text in cases[:MAX_FAULTS_SHOWN]
     ]
-    if len(found) > MAX_FAULTS_SHOWN:
-        others = f"and {len(found) - MAX_FAULTS_SHOWN} more, see records.jsonl"
+    if len(cases) > MAX_FAULTS_SHOWN:
+        others = f"and {len(cases) - MAX_FAULTS_SHOWN} more, see records.jsonl"
         lines.append(CounterExample(others))
     return lines
 

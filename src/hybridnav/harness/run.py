@@ -247,7 +247,7 @@ def _timing_tasks(
     records_there = read_records(folder)
     answered = {r["id"] for r in records_there if r["status"] in ANSWERED}
     slow = {(r["map_sha"], r["method_sha"]) for r in records_there if r["status"] == TOO_SLOW}
-    found = []
+    passes = []
     for sha in dict.fromkeys(task.map_sha for task in tasks):
         own = [task for task in tasks if task.map_sha == sha]
         left_out = records.failed | slow
@@ -267,8 +267,8 @@ def _timing_tasks(
         if len(methods) > 1 and pairs:
             specs = tuple(methods.values())
             timing = (settings.repeat, settings.seed, frozenset(without))
-            found.append(TimingTask(own[0].map, sha, specs, pairs, *timing))
-    return found
+            passes.append(TimingTask(own[0].map, sha, specs, pairs, *timing))
+    return passes
 
 
 @overload
@@ -415,23 +415,23 @@ def _holds(free: BoolArray, cell: tuple[int, int]) -> bool:
 
 def _warn_of(stated: Sequence[Scenario], grid: OccupancyGrid, file: str) -> None:
     """Warn of scenarios that are left out, and of those that name another map."""
-    found = []
+    notes = []
     ends = [(one.start, one.goal) for one in stated]
     blocked = [end for pair in ends for end in pair if grid.classes[end] != CellClass.FREE]
     lost = sum(any(grid.classes[end] != CellClass.FREE for end in pair) for pair in ends)
     if lost:
-        found.append(
+        notes.append(
             f"{lost:,} of {len(ends):,} start or end in a cell that is not free, such as "
             f"{blocked[0]}: they are left out"
         )
     names = {Path(one.map_name.replace("\\", "/")).stem for one in stated}
     others = sorted(name for name in names if name.casefold() != grid.name.casefold())
     if others:
-        found.append(
+        notes.append(
             f"they are for map {brief(others[0])}, and this is {brief(grid.name)}, of the same "
             "size: check that it is the same map"
         )
-    for text in found:
+    for text in notes:
         warnings.warn(f"scenarios {printable(file)}: {text}", MapWarning, stacklevel=2)
 
 

@@ -332,7 +332,7 @@ def distances_on_cluster(
     starts, goals = (read_points(*one) for one in zip(("starts", "goals"), ends, strict=True))
     size = max(1, _ENTRIES // max(len(goals), 1))
     parts = [starts[at : at + size] for at in range(0, max(len(starts), 1), size)]
-    found: list[Any] = []
+    blocks: list[Any] = []
     with _connected(address) as client:
         known = client.scatter([planner, goals], broadcast=True)
         ahead = _AHEAD * max(1, sum(client.nthreads().values()))
@@ -341,12 +341,12 @@ def distances_on_cluster(
             futures = [client.submit(_block, part, *known, asked, pure=False) for part in some]
             for _ in _as_completed(client, futures):
                 pass
-            found += client.gather(futures)
+            blocks += client.gather(futures)
             done = len(goals) * min(len(starts), (first + len(some)) * size)
             progress(done, max(1, len(starts) * len(goals)))
     from scipy import sparse  # noqa: PLC0415 - runs do not need it
 
-    return sparse.vstack(found) if sparse.issparse(found[0]) else np.concatenate(found)
+    return sparse.vstack(blocks) if sparse.issparse(blocks[0]) else np.concatenate(blocks)
 
 
 def _block(starts: FloatArray, planner: HybridPlanner, goals: FloatArray, asked: Any) -> Any:

@@ -38,11 +38,11 @@ def checked_whole(name: str, value: Any, low: int, high: int) -> int:
     range.
     """
     try:
-        found = operator.index(value)
+        number = operator.index(value)
     except TypeError:
-        found = low - 1
-    if low <= found <= high:
-        return found
+        number = low - 1
+    if low <= number <= high:
+        return number
     raise InvalidValueError(
         f"{name} must be a whole number from {low} to {high}, got {brief(value)}"
     )
@@ -54,11 +54,11 @@ def checked_radius(radius_m: Any) -> float:
     Raises `InvalidValueError` when it is no finite number >= 0.
     """
     try:
-        found = float(radius_m)
+        metres = float(radius_m)
     except (TypeError, ValueError):
-        found = math.nan
-    if math.isfinite(found) and found >= 0:
-        return found
+        metres = math.nan
+    if math.isfinite(metres) and metres >= 0:
+        return metres
     raise InvalidValueError(
         f"robot radius must be a finite length in metres >= 0, got {brief(radius_m)}"
     )

@@ -90,20 +90,11 @@ def natural_key(name: str) -> tuple[tuple[bool, int, str], ...]:
 
 
 def matching(text: str, names: Sequence[str]) -> list[int]:
-    """Return which names a text may mean, as people type it.
+    """Return which names a text may mean, as people type it: in any case, with or without accents,
+    words in any order.
 
-    Parameters
-    ----------
-    text
-        What was typed, in any case, with or without accents; words in any order.
-    names
-        The names to choose from.
-
-    Returns
-    -------
-    list of int
-        Indices in `names`: first those that equal the text, then those that begin with it, that
-        have a word that begins with it, and that hold each of its words; each in natural order.
+    Return their indices: first those that equal the text, then those that begin with it, that have
+    a word that begins with it, and that hold each of its words; each in natural order.
 
     Examples
     --------

@@ -58,13 +58,13 @@ class OneWayRule:
         """
         if isinstance(text, OneWayRule):
             return text
-        found = _RULE.fullmatch(text) if isinstance(text, str) else None
-        if found is None:
+        match = _RULE.fullmatch(text) if isinstance(text, str) else None
+        if match is None:
             raise _refused(text)
-        if found["door"]:
-            return cls(int(found["door"]), found["into"] or None)
+        if match["door"]:
+            return cls(int(match["door"]), match["into"] or None)
         try:
-            points = [tuple(map(float, part.split(","))) for part in found["line"].split(":")]
+            points = [tuple(map(float, part.split(","))) for part in match["line"].split(":")]
             return cls(line=tuple((x, y) for x, y in points))
         except ValueError:
             raise _refused(text) from None

@@ -222,9 +222,9 @@ def _poses(result: PlanResult, spacing_m: float, began_s: float) -> list[list[fl
     assert path is not None  # noqa: S101 - those without are left out
     if limits is None:
         return _rows(path.poses(spacing_m), path.directions(spacing_m))
-    found = path.profile(limits, spacing_m)
-    driven = np.column_stack([found.speed_m_s, began_s + found.time_s])
-    return _rows(found.poses, found.directions, driven)
+    profile = path.profile(limits, spacing_m)
+    driven = np.column_stack([profile.speed_m_s, began_s + profile.time_s])
+    return _rows(profile.poses, profile.directions, driven)
 
 
 def _rows(poses: FloatArray, directions: SignArray, *others: FloatArray) -> list[list[float]]:

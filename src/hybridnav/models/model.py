@@ -111,13 +111,13 @@ class Model:
         return parts.grid_of(self._of_kind(structures.GRID.kind)[0], self._sizes)
 
     def _read_rooms(self) -> RoomLabels | None:
-        found = self._of_kind(structures.ROOMS.kind)
-        return parts.rooms_of(found[0], self._sizes) if found else None
+        filed = self._of_kind(structures.ROOMS.kind)
+        return parts.rooms_of(filed[0], self._sizes) if filed else None
 
     def _read_topology(self) -> TopologicalMap:
-        found = self._of_kind(structures.PYRAMID.kind)
-        if found:
-            pyramid = parts.pyramid_of(found[0], self._sizes, self.grid, self.rooms)
+        filed = self._of_kind(structures.PYRAMID.kind)
+        if filed:
+            pyramid = parts.pyramid_of(filed[0], self._sizes, self.grid, self.rooms)
             return TopologicalMap(pyramid)
         return self._grown(self.fitted(None).pyramid, self.rooms)
 
@@ -179,9 +179,9 @@ class Model:
         rooms
             `rooms`, other ones, or None for none.
         """
-        found = self._of_kind(structures.PYRAMID.kind)
-        own = parts.pyramid_settings(found[0]) if found else {}
-        if rooms is self.rooms and own.items() <= settings.model_dump().items() and found:
+        filed = self._of_kind(structures.PYRAMID.kind)
+        own = parts.pyramid_settings(filed[0]) if filed else {}
+        if rooms is self.rooms and own.items() <= settings.model_dump().items() and filed:
             return self.topology
         return self._grown(settings, rooms)
 
@@ -200,8 +200,8 @@ class Model:
             made["robot_radius_m"] = values["robot_radius_m"]
         elif self._grid is not None:
             made["robot_radius_m"] = self._grid.robot_radius_m
-        for found in self._of_kind(structures.PYRAMID.kind):
-            made |= parts.pyramid_settings(found)
+        for filed in self._of_kind(structures.PYRAMID.kind):
+            made |= parts.pyramid_settings(filed)
         pyramid = preset.pyramid.model_copy(update=made)
         return preset.model_copy(update={"pyramid": pyramid})
 

@@ -98,15 +98,15 @@ def parts_of(
         )
     from hybridnav.models.searches import made_for, search_parts  # noqa: PLC0415
 
-    found, keys = _parts_of_map(topology), []
-    found += [parts.preset_part(planner.preset) for planner in planners]
+    filed, keys = _parts_of_map(topology), []
+    filed += [parts.preset_part(planner.preset) for planner in planners]
     for planner in planners:
         settings, prepared = planner.preset.planner, planner.prepared
         key = made_for(settings)
         if prepared is not None and (settings.underlying.method, key) not in keys:
             keys.append((settings.underlying.method, key))
-            found += search_parts(prepared, key)
-    return found
+            filed += search_parts(prepared, key)
+    return filed
 
 
 def _parts_of_map(topology: TopologicalMap) -> list[Part]:

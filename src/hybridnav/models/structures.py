@@ -143,12 +143,12 @@ class Structure:
         sizes = filed.part.sizes
         if sizes.keys() != self.most.keys():
             raise refusal(filed, f"its sizes are {', '.join(sizes) or 'none'}")
-        found = {**sizes, **known}
+        known_sizes = {**sizes, **known}
         for name, most in self.most.items():
-            limit = evaluated(most, found)
+            limit = evaluated(most, known_sizes)
             if sizes[name] > limit:
                 raise refusal(filed, f"{name} is {sizes[name]}, expected at most {limit}")
-        return found
+        return known_sizes
 
 
 def evaluated(size: _Size, sizes: Mapping[str, int]) -> int:

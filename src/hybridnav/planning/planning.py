@@ -57,7 +57,6 @@ class Planning:
 
     preset: Preset
     grid: OccupancyGrid
-    """The map."""
     built: TopologicalMap | None
     """The places that were built last, of this grid or of one before; None for a grid alone."""
     method: Method

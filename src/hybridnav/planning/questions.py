@@ -46,7 +46,6 @@ class Unanswered:
     ends: tuple[Any, Any]
     """Start and goal, `(x, y)` or `(x, y, yaw)`, metres, map frame."""
     closed: Closable | ClosedCells | None
-    """What was closed."""
 
     def __call__(self, radius_m: float | None = None) -> Explanation:
         """Find the reasons, for a robot of a radius in metres; None for the map's."""

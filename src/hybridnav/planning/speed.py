@@ -161,16 +161,10 @@ class SpeedProfile:
 def profile_of(
     driven: Spread, limits: MotionLimits, speed_map: SpeedMap | None, *, is_curved: bool
 ) -> SpeedProfile:
-    """Return the time-optimal speeds along poses.
+    """Return the time-optimal speeds along poses, as `Path.profile` does.
 
-    Parameters
-    ----------
-    driven
-        The poses, two at each turn on the spot, and the steps between them, each of one curvature.
-    limits, speed_map
-        As in `Path.profile`.
-    is_curved
-        Whether the steps are arcs, tangent to the headings; else straight lines.
+    `driven`: the poses, two at each turn on the spot, and the steps between them, each of one
+    curvature; `is_curved`: whether these are arcs, tangent to the headings; else straight lines.
 
     Notes
     -----

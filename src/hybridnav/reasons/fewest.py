@@ -134,15 +134,15 @@ class _Sets:
         given = list(closures)
         if not given:
             return
-        found = unique_rows(np.concatenate([rows for _, rows in given]))
+        sets_of = unique_rows(np.concatenate([rows for _, rows in given]))
         by = np.concatenate([np.full(len(rows), k) for k, rows in given])
-        order = np.lexsort([by, found.number_of])
-        parts = np.split(by[order], np.cumsum(found.n_times)[:-1])
+        order = np.lexsort([by, sets_of.number_of])
+        parts = np.split(by[order], np.cumsum(sets_of.n_times)[:-1])
         numbers: dict[frozenset[int], int] = {_NONE: 0}
         self._number = np.array(
             [numbers.setdefault(frozenset(part.tolist()), len(numbers)) for part in parts]
         )
-        self._rows, self.sets = found.rows, list(numbers)
+        self._rows, self.sets = sets_of.rows, list(numbers)
 
     def of(self, rows: LongArray) -> LongArray:
         """Return the number of the set that holds each row, 0 for none."""

@@ -48,7 +48,6 @@ class Explanation:
     blocked_ends: tuple[BlockedEnd, ...]
     """The ends that the robot cannot stand on."""
     closed: Bottleneck
-    """The bottleneck with all that is closed."""
     opened: Bottleneck
     """The bottleneck with nothing closed."""
     tight: TightPlace | None
@@ -178,8 +177,8 @@ class Case:
         """Return what has a direction that parts the ends, and whether it is round the start."""
         from hybridnav.search.proofs import parting_sides  # noqa: PLC0415 - loads kernels
 
-        found = parting_sides(self._open, one_way, self._cells)
-        return ((), False) if found is None else (tuple(map(_directed, found[0])), found[1])
+        parting = parting_sides(self._open, one_way, self._cells)
+        return ((), False) if parting is None else (tuple(map(_directed, parting[0])), parting[1])
 
     def _cut(self) -> FloatArray | None:
         """Return the chain of walls that parts the two ends."""
@@ -210,12 +209,14 @@ class Case:
     @cached_property
     def _closures(self) -> dict[Closure, LongArray]:
         """What each closure closes: flat cells, or moves between two where it is a boundary."""
-        found = {} if self.costs is None else {Closure("costs", None): self.costs.flat}
+        closures = {} if self.costs is None else {Closure("costs", None): self.costs.flat}
         if isinstance(self.blocked, Blocked):
-            found |= {closure: self._closed_by(one) for closure, one in each_closure(self.blocked)}
+            closures |= {
+                closure: self._closed_by(one) for closure, one in each_closure(self.blocked)
+            }
         elif self.blocked is not None:
-            found[Closure("cells", None)] = self.blocked.flat
-        return found
+            closures[Closure("cells", None)] = self.blocked.flat
+        return closures
 
     def _closed_by(self, one: Blocked) -> LongArray:
         """Return the cells that one closure closes; of a boundary the moves across it."""
@@ -253,7 +254,7 @@ class Case:
 
     def _blocked_ends(self) -> tuple[BlockedEnd, ...]:
         """Return the ends that the robot cannot stand on, the start first."""
-        found = []
+        blocked = []
         for is_start, point, cell in zip((True, False), self.points, self._cells, strict=True):
             pose, allowed = tuple(point.tolist()), self.allow_unexplored
             *_, status = places_of_endpoints(self.grid, (pose, pose), allow_unexplored=allowed)
@@ -267,8 +268,8 @@ class Case:
             name = status.value.split(" ", 1)[1]
             status = PlanStatus(f"{'start' if is_start else 'goal'} {name}")
             end = BlockedEnd(is_start, status, self._clear(cell), by, *self._nearest(point))
-            found.append(end)
-        return tuple(found)
+            blocked.append(end)
+        return tuple(blocked)
 
     def _clear(self, cell: tuple[int, int]) -> float:
         """Return the distance from a cell to the nearest occupied one, 0 outside the map."""
@@ -417,17 +418,8 @@ def reasons_of(
     *,
     radius_m: float | None = None,
 ) -> Explanation:
-    """Explain a query of a planner; see `explain`.
-
-    Parameters
-    ----------
-    now
-        How the planner plans.
-    ends
-        Start and goal, `(x, y)` or `(x, y, yaw)` each, metres, map frame.
-    blocked, radius_m
-        As in `explain`.
-    """
+    """Explain a query from and to `ends`, `(x, y)` or `(x, y, yaw)`, metres, map frame; see
+    `explain`."""
     grid = now.grid if radius_m is None else replace(now.grid, robot_radius_m=radius_m)
     if blocked is not None and not isinstance(blocked, ClosedCells):
         blocked = as_blocked(blocked)
@@ -461,11 +453,11 @@ def explain_solved(
     own point may be wider, and the wider one of both is told. `points`: the ends of the path;
     `waypoints`: those that were given, points or names.
     """
-    found = [explain(planner, *points, **how)]
+    explanations = [explain(planner, *points, **how)]
     if any(isinstance(one, str) for one in waypoints):
         ends = [
             one if isinstance(one, str) else point
             for one, point in zip(waypoints, points, strict=True)
         ]
-        found.append(explain(planner, *ends, **how))
-    return max(found, key=lambda one: one.widest_m)
+        explanations.append(explain(planner, *ends, **how))
+    return max(explanations, key=lambda one: one.widest_m)

@@ -144,10 +144,10 @@ class MaxDistanceSearch:
         CoarseRoute | None
             None where no route joins them.
         """
-        found = self._search.search(start, goal)
-        if found.vertices is None:
+        route = self._search.search(start, goal)
+        if route.vertices is None:
             return None
-        return CoarseRoute(found.vertices, found.arcs, found.expanded)
+        return CoarseRoute(route.vertices, route.arcs, route.expanded)
 
 
 def corridor_of(

@@ -172,17 +172,17 @@ class DoorGraph:
             int64 (m,), flat cells, sorted, each once.
         """
         key = flat.tobytes()
-        found = self._closed.get(key)
-        if found is None:
-            found = DoorGraph(
+        graph = self._closed.get(key)
+        if graph is None:
+            graph = DoorGraph(
                 self._rooms,
                 allow_unexplored=self._allow_unexplored,
                 closed=flat,
                 opened=self,
                 factors=self._factors,
             )
-            keep_last(self._closed, key, found, _MOST_KEPT)
-        return found
+            keep_last(self._closed, key, graph, _MOST_KEPT)
+        return graph
 
     def routes(self, start: int, goal: int) -> Iterator[DoorRoute]:
         """Find routes that pass no room twice, the shortest first.
@@ -255,8 +255,8 @@ class DoorGraph:
         field = self._fields.window(vertex) if len(cells) > 1 else None
         for number, cell in enumerate(cells[:-1].tolist(), start=1):
             assert field is not None  # noqa: S101 - there are two cells
-            found = field.costs(cell, cells[number:])
-            costs[number - 1, number:] = costs[number:, number - 1] = found
+            reached = field.costs(cell, cells[number:])
+            costs[number - 1, number:] = costs[number:, number - 1] = reached
         return _Legs(leaving, cells, costs)
 
     def _outer(self, start: int, goal: int, origin: int) -> Iterator[_Links]:
@@ -350,11 +350,11 @@ def door_graph(
     """
     by_map = _KEPT if costs is None else _KEPT_BY_COSTS.setdefault(costs, WeakKeyDictionary())
     kept = by_map.setdefault(topology, {})
-    found = kept.get(allow_unexplored)
-    if found is None:
-        found = kept[allow_unexplored] = DoorGraph(
+    graph = kept.get(allow_unexplored)
+    if graph is None:
+        graph = kept[allow_unexplored] = DoorGraph(
             topology.rooms,
             allow_unexplored=allow_unexplored,
             factors=None if costs is None else costs.factors.astype(np.float64),
         )
-    return found
+    return graph

@@ -78,13 +78,13 @@ class FieldWindow(NamedTuple):
         inside &= cols < self.label.shape[1]
         at = np.where(inside, rows * self.label.shape[1] + cols, 0)
         if self.moves is None:
-            found = field_distances(self.classes, self.label.ravel(), at[:1])
+            known = field_distances(self.classes, self.label.ravel(), at[:1])
         else:
             from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415 - most planners need no rooms
 
             reached = dijkstra(self.moves, directed=False, indices=at[:1])[0]
-            found = np.where(np.isfinite(reached), reached, -1.0).astype(np.int64)
-        return np.where(inside, found[at], -1)[1:]
+            known = np.where(np.isfinite(reached), reached, -1.0).astype(np.int64)
+        return np.where(inside, known[at], -1)[1:]
 
 
 def _weighted_moves(

@@ -44,7 +44,7 @@ def visits_of(
     along = lengths_along(cells)
     scale = length_m / along[-1] if along[-1] > 0 else 0.0
     labels = rooms.label_of_vertex[vertices].tolist()
-    found: list[RoomVisit] = []
+    visits: list[RoomVisit] = []
     begun, from_step = 0.0, 0
     for number, arc in enumerate(arcs):
         if labels[number] == labels[number + 1]:
@@ -55,12 +55,12 @@ def visits_of(
         x, y = rooms.grid.frame.points_of(cells[step : step + 2]).mean(axis=0).tolist()
         own, part_m = cells[from_step : step + 1], float((ended - begun) * scale)
         door = rooms.door_of_arc.get(arc)
-        found.append(RoomVisit(vertices[number], labels[number], own, part_m, (x, y), door))
+        visits.append(RoomVisit(vertices[number], labels[number], own, part_m, (x, y), door))
         begun, from_step = ended, step + 1
     x, y = rooms.grid.frame.points_of(cells[-1:])[0].tolist()
     part_m = float((along[-1] - begun) * scale)
-    found.append(RoomVisit(vertices[-1], labels[-1], cells[from_step:], part_m, (x, y)))
-    return _without_grazes(found)
+    visits.append(RoomVisit(vertices[-1], labels[-1], cells[from_step:], part_m, (x, y)))
+    return _without_grazes(visits)
 
 
 def _without_grazes(visits: list[RoomVisit]) -> list[RoomVisit]:

@@ -85,9 +85,9 @@ class Inclusion:
         """The outermost block that each place bounds, -1 for a place without an arc."""
         block = self._block_of_face[self._level.dual.face_of]
         order = np.lexsort((self._depth_of_block[block], self._origin))
-        found, first = np.unique(self._origin[order], return_index=True)
+        places, first = np.unique(self._origin[order], return_index=True)
         outermost = np.full(self._level.n_vertices, -1, dtype=np.int64)
-        outermost[found] = block[order][first]
+        outermost[places] = block[order][first]
         return outermost
 
     @cached_property

@@ -244,10 +244,10 @@ class Hole:
         number = np.full(mask.shape, -1, dtype=np.int64)
         number[tuple(cells.T)] = np.arange(len(cells))
         graph = _links(number)
-        found = number[tuple(nearest.T)]
+        hole_of = number[tuple(nearest.T)]
         distance = distance_to_rim(mask)
         if outside:
-            sampled = np.unique(found)
+            sampled = np.unique(hole_of)
             sampled = sampled[:: -(-len(sampled) // _SAMPLED_ENDS)]
             lengths = dijkstra(graph, directed=False, indices=sampled)
             centre = int(lengths.max(axis=0).argmin())
@@ -258,7 +258,7 @@ class Hole:
         )
         walks = WalkTree(cells, length[0], before[0])
         links = []
-        for cell, end in zip(found.tolist(), endpoints, strict=True):
+        for cell, end in zip(hole_of.tolist(), endpoints, strict=True):
             walk = np.concatenate([end[None], walks.to(cell)[::-1]])
             short = len(walk) <= _SHORT
             links.append(smoothed(walk, distance, 1.0) if short else rounded(walk))

@@ -240,8 +240,8 @@ class Loops:
         low, high = self._cells_beside(loop)
         # Ends of the sides between two cells, each named by the cell to its upper right.
         corners = np.concatenate([high, high + (high - low)[:, ::-1]])
-        found = unique_rows(corners)
-        rows, cols = found.rows[found.n_times == 1].T
+        points = unique_rows(corners)
+        rows, cols = points.rows[points.n_times == 1].T
         around = np.stack([self.hole_of[rows - i, cols - j] for i in (0, 1) for j in (0, 1)])
         return [int(hole) for hole in around.max(axis=0)]
 
@@ -309,13 +309,13 @@ class Loops:
     def _nearest(self, loop: int) -> list[int]:
         """Return a self-loop of the place and those that join the holes nearest to it in the
         tree."""
-        reached, found = set(self.endpoints[loop]), [loop]
+        reached, chain = set(self.endpoints[loop]), [loop]
         others = set(self.endpoints) - {loop}
-        while others and len(found) < _MOST_LINES:
-            found.append(min(other for other in others if reached & set(self.endpoints[other])))
-            reached |= set(self.endpoints[found[-1]])
-            others.remove(found[-1])
-        return found
+        while others and len(chain) < _MOST_LINES:
+            chain.append(min(other for other in others if reached & set(self.endpoints[other])))
+            reached |= set(self.endpoints[chain[-1]])
+            others.remove(chain[-1])
+        return chain
 
     def _petal(self, loop: int) -> FloatArray:
         """Return a closed curve to just behind the middle of the holes that a loop encloses."""

@@ -152,14 +152,14 @@ def _along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
 
     A straight path has points at its bends alone, and a label between two of them would hide it.
     """
-    found = [np.empty((0, 2))]
+    places = [np.empty((0, 2))]
     for line in lines:
         where = lengths_along(line)[: len(line)]
         if len(line):
             count = 2 + int(min(where[-1] / spacing_m, _MOST_ALONG))
             at = np.linspace(0.0, where[-1], count)
-            found.append(np.stack([np.interp(at, where, part) for part in line.T], axis=1))
-    return np.concatenate(found)
+            places.append(np.stack([np.interp(at, where, part) for part in line.T], axis=1))
+    return np.concatenate(places)
 
 
 def _cost(labels: LabelPlacer, box: FloatArray, along: FloatArray) -> float:
@@ -320,8 +320,8 @@ class RoomWriter:
         xy = np.meshgrid(*np.linspace(box[0], box[1], _SAMPLES).T)
         cells = self._grid.frame.cells_of(np.stack([axis.ravel() for axis in xy], axis=1))
         cells = cells[((cells >= 0) & (cells < self._grid.shape)).all(axis=1)]
-        found = self._rooms.label_of[tuple(cells.T)]
-        return bool(np.isin(found, (label, NO_ROOM)).all())
+        labels = self._rooms.label_of[tuple(cells.T)]
+        return bool(np.isin(labels, (label, NO_ROOM)).all())
 
 
 def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
@@ -342,7 +342,7 @@ def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -
     """
     depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
     rows, cols = np.indices((_PARTS, _PARTS)).reshape(2, -1)
-    found = []
+    deepest = []
     for row, col in zip(rows.tolist(), cols.tolist(), strict=True):
         low = row * depth.shape[0] // _PARTS, col * depth.shape[1] // _PARTS
         part = depth[
@@ -351,6 +351,6 @@ def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -
         ]
         if part.size and part.max() > 0:
             at = np.add(np.unravel_index(int(part.argmax()), part.shape), low)
-            found.append((-float(part.max()), tuple(at.tolist())))
+            deepest.append((-float(part.max()), tuple(at.tolist())))
     corner = tuple(span.start for span in window)
-    return [grid.frame.points_of(np.add(at, corner)) for _, at in sorted(found)]
+    return [grid.frame.points_of(np.add(at, corner)) for _, at in sorted(deepest)]

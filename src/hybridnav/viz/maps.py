@@ -277,10 +277,10 @@ def draw_one_way(
 
     `given`: that of a query, beside the rules of the rooms. Result: entries of the legend.
     """
-    found = directions_on(topology, given)
-    if found is None or not len(found.sides):
+    directions = directions_on(topology, given)
+    if directions is None or not len(directions.sides):
         return []
-    one, other = found.sides[:, :2], found.sides[:, 2:]
+    one, other = directions.sides[:, :2], directions.sides[:, 2:]
     corners, across = np.maximum(one, other), np.abs(other - one)[:, ::-1]
     frame, width = topology.grid.frame, 1.2 * canvas.sizes.line
     lines = np.stack([frame.points_of_grid(each) for each in (corners, corners + across)], axis=1)
@@ -288,9 +288,9 @@ def draw_one_way(
     middles, steps = lines.mean(axis=1), frame.points_of(other) - frame.points_of(one)
     at = [  # the side in the middle of each thing
         places[((middles[places] - middles[places].mean(axis=0)) ** 2).sum(axis=1).argmin()]
-        for places in found.parts.values()
+        for places in directions.parts.values()
     ]
-    along = np.array([steps[places].mean(axis=0) for places in found.parts.values()])
+    along = np.array([steps[places].mean(axis=0) for places in directions.parts.values()])
     canvas.add_arrows(middles[at], along, color=_CLOSED, zorder=8.5, gid="one-way-arrows")
     mark = Line2D([], [], color=_CLOSED, lw=width, marker=">", markersize=5 * canvas.sizes.line)
     return [(mark, "one way")]

@@ -56,10 +56,10 @@ def neighbours(label_of: IntArray, resolution_m: float) -> LongArray:
     away, (row, col) = ndimage.distance_transform_edt(coarse == NO_ROOM, return_indices=True)
     near = away * (step * resolution_m) <= _WALL_M / 2
     grown = np.where(near, coarse[row, col], np.int32(NO_ROOM))
-    found = [np.empty(0, np.int64)]
+    pairs = [np.empty(0, np.int64)]
     for of in (label_of, grown):
         for one, other in ((of[:, :-1], of[:, 1:]), (of[:-1], of[1:])):
             between = (one != other) & (one != NO_ROOM) & (other != NO_ROOM)
             low, high = np.sort([one[between], other[between]], axis=0).astype(np.int64)
-            found.append(np.unique(low * n_rooms + high))
-    return np.stack(np.divmod(np.unique(np.concatenate(found)), n_rooms), axis=1)
+            pairs.append(np.unique(low * n_rooms + high))
+    return np.stack(np.divmod(np.unique(np.concatenate(pairs)), n_rooms), axis=1)

@@ -54,7 +54,6 @@ def check_version(version):
 
 
 def numbers_of(version):
-    """Return the number of the place of each cell, -1 for none."""
     numbers = np.append(version.place_numbers, -1)
     return numbers[version.pyramid[-1].field_of]
 

@@ -44,20 +44,10 @@ class _Answers(ABC):
         self._changes = Changes(kinds)
 
     def call(self, name: str, arguments: dict[str, Any]) -> dict[str, Any]:
-        """Answer a question.
+        """Answer a question, by the name of one of `TOOLS` and the arguments of its model.
 
-        Parameters
-        ----------
-        name
-            The name of one of `TOOLS`.
-        arguments
-            Those of its model.
-
-        Returns
-        -------
-        dict
-            An `Answer`; with `ok` False if the question cannot be answered as it is, where `text`
-            has advice, and `choices` the meanings of a name. Pictures have `png`, bytes.
+        Return an `Answer`; with `ok` False if the question cannot be answered as it is, where
+        `text` has advice, and `choices` the meanings of a name. Pictures have `png`, bytes.
         """
         functions = {tool: getattr(self, f"_{tool.name}") for tool in self._known}
         with self._lock:
@@ -203,19 +193,19 @@ class MapAnswers(_Answers):
         if asked.within is None or tour.start is None or tour.goal is None:
             return {}
         shut = self._shut(asked.avoiding)
-        found = planner.plan(tour.start, tour.goal, blocked=shut, within_m=asked.within)
-        if found.path is None:
+        nearest = planner.plan(tour.start, tour.goal, blocked=shut, within_m=asked.within)
+        if nearest.path is None:
             return {}
-        bound = math.floor(found.lower_bound * 1000) / 1000
-        points = found.path.points
+        bound = math.floor(nearest.lower_bound * 1000) / 1000
+        points = nearest.path.points
         answer = {
-            "text": f"{found.reason} The nearest point that can be reached lies "
-            f"{found.short_m:.2f} m from the goal; {found.cost:.2f} m to it.",
-            "status": str(found.status),
-            "length_m": round(found.cost, 3),
+            "text": f"{nearest.reason} The nearest point that can be reached lies "
+            f"{nearest.short_m:.2f} m from the goal; {nearest.cost:.2f} m to it.",
+            "status": str(nearest.status),
+            "length_m": round(nearest.cost, 3),
             "lower_bound_m": bound,
-            "short_m": round(found.short_m, 3),
-            "start": places.rounded(found.start),
+            "short_m": round(nearest.short_m, 3),
+            "start": places.rounded(nearest.start),
             "goal": places.rounded(tuple(points[-1].tolist())),
         }
         return answer | (
@@ -285,11 +275,11 @@ class MapAnswers(_Answers):
             raise places.nothing(asked.of, "nothing", known, self._places.choices)
 
         def plan(point: places.Point) -> tuple[float, dict[str, Any]]:
-            found = planner.plan(here, point, blocked=shut)
-            if not math.isfinite(found.cost):
-                return found.cost, {}
-            bound_m = places.rounded_down(found.lower_bound)
-            return found.cost, {"length_m": round(found.cost, 3), "lower_bound_m": bound_m}
+            result = planner.plan(here, point, blocked=shut)
+            if not math.isfinite(result.cost):
+                return result.cost, {}
+            bound_m = places.rounded_down(result.lower_bound)
+            return result.cost, {"length_m": round(result.cost, 3), "lower_bound_m": bound_m}
 
         goals.sort(key=lambda goal: dist(goal[1], here))
         least = [(dist(at, here), k, facts, at) for k, (facts, at) in enumerate(goals)]
@@ -316,8 +306,8 @@ class MapAnswers(_Answers):
     # Changes.
 
     def _named(self, asked: ask.Close) -> list[places.Thing]:
-        found = self._places.things(asked.doors, of_doors=True)
-        return found + self._places.things(asked.rooms)
+        things = self._places.things(asked.doors, of_doors=True)
+        return things + self._places.things(asked.rooms)
 
     def _name_room(self, asked: ask.NameRoom) -> dict[str, Any]:
         old = self._places.meant(asked.room, list(self._rooms.names))
@@ -402,12 +392,12 @@ class Changes:
 # What one map and a building both do.
 
 
-def rooms_answer(found: Sequence[dict[str, Any]], asked: ask.ListRooms) -> dict[str, Any]:
+def rooms_answer(rooms: Sequence[dict[str, Any]], asked: ask.ListRooms) -> dict[str, Any]:
     """Return the part of a list of rooms that is asked for."""
-    shown = found[asked.first : asked.first + asked.count]
-    rest = len(found) - asked.first - len(shown)
-    text = f"{len(found)} rooms" + (f", {rest} more after these" if rest > 0 else "")
-    return {"text": text, "total": len(found), "rooms": shown}
+    shown = rooms[asked.first : asked.first + asked.count]
+    rest = len(rooms) - asked.first - len(shown)
+    text = f"{len(rooms)} rooms" + (f", {rest} more after these" if rest > 0 else "")
+    return {"text": text, "total": len(rooms), "rooms": shown}
 
 
 def nearest_answer(

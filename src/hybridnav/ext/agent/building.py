@@ -95,14 +95,14 @@ class BuildingAnswers(_Answers):
     def _list_rooms(self, asked: Any) -> dict[str, Any]:
         names = self._names
         on = names.on if asked.floor is None else {(one := names.floor(asked.floor)): names.on[one]}
-        found = [room | {"floor": floor} for floor, one in on.items() for room in one.asked(asked)]
-        return rooms_answer(found, asked)
+        rooms = [room | {"floor": floor} for floor, one in on.items() for room in one.asked(asked)]
+        return rooms_answer(rooms, asked)
 
     def _where_am_i(self, asked: Any) -> dict[str, Any]:
         names = self._names
         floor, point = names.place(asked.point)
-        found = names.on[floor].where(names.point_of((floor, point)))
-        return found | {"text": f"Floor {floor}: {found['text']}", "floor": floor}
+        place = names.on[floor].where(names.point_of((floor, point)))
+        return place | {"text": f"Floor {floor}: {place['text']}", "floor": floor}
 
     # Routes.
 
@@ -181,7 +181,7 @@ class BuildingAnswers(_Answers):
 
     def _parts(self, leg: BuildingPlan) -> list[dict[str, Any]]:
         """Return the way on each floor, and the ride that it ends with."""
-        found = []
+        parts = []
         for floor, result, ride in zip(leg.floors, leg.results, [*leg.rides, None], strict=True):
             guide, path = guide_of(self._building.floor(floor).planner), result.path
             assert path is not None  # noqa: S101 - it is solved
@@ -192,8 +192,8 @@ class BuildingAnswers(_Answers):
                 "rooms": [one.room or one.shape for one in passed][:_PASSED],
                 "doors": [one.door.number for one in passed if one.door is not None][:_PASSED],
             }
-            found.append(part | ({} if ride is None else {"ride": ride.to_dict()}))
-        return found
+            parts.append(part | ({} if ride is None else {"ride": ride.to_dict()}))
+        return parts
 
     def _can_reach(self, asked: Any) -> dict[str, Any]:
         legs = self._legs(asked.start, asked.goal, self._how(asked.avoiding, asked.width))
@@ -307,9 +307,9 @@ class FloorNames:
                 rf"(?:(?:floor|etage)\s+{this}\s*[,:]|{this}\s*:)\s*(.+)",
                 rf"(.+?),?\s+(?:on |auf )?\(?(?:floor|etage)\s+{this}\)?",
             ):
-                found = re.fullmatch(form, text, re.IGNORECASE)
-                if found is not None:
-                    return name, found[1].strip()
+                match = re.fullmatch(form, text, re.IGNORECASE)
+                if match is not None:
+                    return name, match[1].strip()
         other = re.match(
             r"(?:floor|etage)\s+([^,:]+)[,:]|(?!link|door|room)([^:,]+):", text, re.IGNORECASE
         )
@@ -348,12 +348,12 @@ class FloorNames:
 
     def _choices(self, names: Iterable[str]) -> list[dict[str, Any]]:
         """Return what an answer shows of names: each on each floor that has it."""
-        found: list[dict[str, Any]] = []
+        choices: list[dict[str, Any]] = []
         for name in names:
             having = [each for each, one in self.on.items() if name in one.names(points=True)]
-            found += [self.on[each].choices([name])[0] | {"floor": each} for each in having]
-            found += [] if having else [{"name": name}]
-        return found[: places.SHOWN]
+            choices += [self.on[each].choices([name])[0] | {"floor": each} for each in having]
+            choices += [] if having else [{"name": name}]
+        return choices[: places.SHOWN]
 
     def things(self, given: list[int | str], *, of_doors: bool = False) -> list[Thing]:
         """Return what a list names: "floor 2, door 4", "2:lobby", "north lift", "north lift@2".
@@ -396,14 +396,14 @@ class FloorNames:
     ) -> list[tuple[str, dict[str, Any], tuple[float, float]]]:
         """Return rooms or doors of a kind or name, each with its floor and a point to go to."""
         floor, text = self.parted(of)
-        found = [
+        named = [
             (each, facts, point)
             for each, one in self._on(floor).items()
             for facts, point in one.candidates(text, start[1] if each == start[0] else "")
         ]
-        if not found:
+        if not named:
             raise places.nothing(of, "nothing", self._known(floor), self._choices)
-        return found
+        return named
 
     def _on(self, floor: str | None) -> Mapping[str, NamedPlaces]:
         return self.on if floor is None else {floor: self.on[floor]}

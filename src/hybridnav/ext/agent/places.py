@@ -176,14 +176,14 @@ class NamedPlaces:
 
         `of_doors`: whether "12" is a door too.
         """
-        found = []
+        items = []
         for thing in things:
             number = door_of(thing, of_doors=of_doors)
             if number is not None:
-                found.append(Thing("doors", self.rooms.listed_door(number).number))
+                items.append(Thing("doors", self.rooms.listed_door(number).number))
             else:
-                found.append(Thing("rooms", self.meant(str(thing).strip(), list(self.rooms.names))))
-        return found
+                items.append(Thing("rooms", self.meant(str(thing).strip(), list(self.rooms.names))))
+        return items
 
     def candidates(
         self, of: str, start: str | tuple[float, float]
@@ -199,10 +199,10 @@ class NamedPlaces:
                 if door.passable and not door.is_opening
             ]
         names = [name for name in self.listed() if name != start]
-        found = [name for name in names if self.kind(name) == kind]
+        fitting = [name for name in names if self.kind(name) == kind]
         # A map without halls may have a room called "hall 3".
-        found = found or [names[at] for at in matching(kind or of, names)]
-        return [(self.room(name), rooms.point_of(name)) for name in found]
+        fitting = fitting or [names[at] for at in matching(kind or of, names)]
+        return [(self.room(name), rooms.point_of(name)) for name in fitting]
 
     def _beside(self, door: Door) -> tuple[float, float]:
         """Return a point in a door that the robot can stand on."""
@@ -240,17 +240,17 @@ def meant(name: str, known: Sequence[str], choices: Choices) -> str:
     while len(wanted) > 1 and wanted[0] in _ARTICLES:
         wanted = wanted[1:]
     text = " ".join(wanted)
-    found = [known[at] for at in matching(text, known)]
+    fitting = [known[at] for at in matching(text, known)]
     plain = _SIGNS.sub(" ", text).strip()
     alike = [one for one in known if _SIGNS.sub(" ", folded(one)).strip() == plain]
-    found = alike or found
-    if len(found) == 1:
-        return found[0]
-    if not found:
+    fitting = alike or fitting
+    if len(fitting) == 1:
+        return fitting[0]
+    if not fitting:
         raise nothing(name, "no room", known, choices)
     raise UnclearError(
-        f"{name!r:.80} may mean {len(found)} of them: ask again with one of the names",
-        choices(found[:SHOWN]),
+        f"{name!r:.80} may mean {len(fitting)} of them: ask again with one of the names",
+        choices(fitting[:SHOWN]),
     )
 
 

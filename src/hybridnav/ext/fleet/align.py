@@ -126,15 +126,15 @@ def _pairs(
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """Return each end on a floor, and the mean of the placed ends of its link; only of lifts where
     there is one, because flights of stairs lead sideways."""
-    found = []
+    pairs = []
     for link in links:
         end = link.end_on(floor)
         placed = [moved_point(e.position_m, poses[e.floor]) for e in link.ends if e.floor in poses]
         if end is not None and placed:
             x, y = np.mean(placed, axis=0).tolist()
-            found.append((link.kind == "lift", (end.position_m, (x, y))))
-    has_lift = any(is_lift for is_lift, _ in found)
-    return [pair for is_lift, pair in found if is_lift or not has_lift]
+            pairs.append((link.kind == "lift", (end.position_m, (x, y))))
+    has_lift = any(is_lift for is_lift, _ in pairs)
+    return [pair for is_lift, pair in pairs if is_lift or not has_lift]
 
 
 def fitted_pose(own: FloatArray, wanted: FloatArray) -> Pose:
@@ -147,8 +147,8 @@ def fitted_pose(own: FloatArray, wanted: FloatArray) -> Pose:
 
 
 def _end(end: LinkEnd, poses: dict[str, Pose]) -> LinkEnd:
-    known = poses.get(end.floor)
-    return end if known is None else LinkEnd(end.floor, moved_point(end.position_m, known))
+    pose = poses.get(end.floor)
+    return end if pose is None else LinkEnd(end.floor, moved_point(end.position_m, pose))
 
 
 def moved_point(point: tuple[float, float], pose: Pose) -> tuple[float, float]:
@@ -230,8 +230,8 @@ def _poses(own: FloatArray, wanted: FloatArray) -> Iterator[Pose]:
 
 def _away(own: FloatArray, wanted: FloatArray, pose: Pose) -> FloatArray:
     """Return the distance of each end from that of the building, float64 (n,), in metres."""
-    found: FloatArray = hypots(*(moved_points(own, pose) - wanted).T)
-    return found
+    away_m: FloatArray = hypots(*(moved_points(own, pose) - wanted).T)
+    return away_m
 
 
 def _share_in_walls(points: FloatArray, free: BoolArray, grid: OccupancyGrid) -> float:

@@ -159,11 +159,11 @@ class FloorTable:
         kept = self._results.get((start, goal))
         if kept is not None:
             return kept, True
-        found = self.floor.planner.plan(
+        result = self.floor.planner.plan(
             self.positions_m[start], self.positions_m[goal], blocked=self.closed
         )
-        self._learn(start, goal, found.cost, found.lower_bound)
-        return keep_last(self._results, (start, goal), found, _KEPT), False
+        self._learn(start, goal, result.cost, result.lower_bound)
+        return keep_last(self._results, (start, goal), result, _KEPT), False
 
     def fill(self) -> None:
         """Compute all costs that are not known yet, if the ends are at most 128."""
@@ -172,8 +172,8 @@ class FloorTable:
         is_missing = np.isnan(self.cost) & ~np.eye(len(self.cost), dtype=np.bool_)
         missing = np.argwhere(is_missing)
         if len(missing):
-            found = self.floor.planner.plan_many(*self.positions_m[missing.T], blocked=self.closed)
-            source, costs = found.lower_bound_source, found.cost.tolist()
+            plans = self.floor.planner.plan_many(*self.positions_m[missing.T], blocked=self.closed)
+            source, costs = plans.lower_bound_source, plans.cost.tolist()
             # Bounds that take a search of their own are left to the pairs of a route.
             bounds = np.zeros(len(costs)) if callable(source) else source
             for (start, goal), cost, bound in zip(missing.tolist(), costs, bounds, strict=True):

@@ -245,8 +245,8 @@ class BuildingNetwork:
             if clear_edges_only and not is_sound:
                 continue
             cost = self._charge(link, one, other)
-            known = self.lanes.get((node[one], node[other]))
-            if known is None or cost < known.cost:
+            lane = self.lanes.get((node[one], node[other]))
+            if lane is None or cost < lane.cost:
                 self.lanes[node[one], node[other]] = Lane(link.drawn.name, cost, is_sound)
 
     def _charge(self, link: MatchedLink, one: str, other: str) -> float:

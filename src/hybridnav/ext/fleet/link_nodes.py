@@ -66,9 +66,7 @@ class FloorArea:
     """
 
     name: str
-    """Name."""
     kind: Literal["room", "corridor"]
-    """What it is."""
     outline: FloatArray
     """float64 (k, 2), corners `(x, y)` in metres, each once."""
 
@@ -93,7 +91,6 @@ class FloorGraph:
     """
 
     name: str
-    """Name of the floor."""
     graph: WaypointGraph
     """Nodes and edges, in the frame of the floor. Facts that writers know: of nodes `name`, of
     edges `door_name` and `speed_limit` in m/s."""
@@ -127,7 +124,6 @@ class BuildingGraph:
     """
 
     name: str
-    """Name of the building."""
     floors: tuple[FloorGraph, ...]
     """One or more, from the lowest to the highest where that is known."""
     links: tuple[Link, ...] = ()
@@ -141,7 +137,7 @@ class BuildingGraph:
                 f"building {self.name!r:.60} has the floors {', '.join(names)[:200] or 'none'}, "
                 "expected one or more of different names"
             )
-        known = set(names)
+        floor_names = set(names)
         links = [checked_type("links", link, Link) for link in self.links]
         if len({link.name for link in links}) < len(links):
             raise InvalidValueError(
@@ -149,7 +145,7 @@ class BuildingGraph:
             )
         for link in links:
             for end in link.ends:
-                if end.floor not in known:
+                if end.floor not in floor_names:
                     raise InvalidValueError(
                         f"link {link.name!r:.60} has an end on floor {end.floor!r:.60}, expected "
                         f"one of {', '.join(names)[:200]}"
@@ -163,8 +159,8 @@ class BuildingGraph:
         InvalidValueError
             When there is none; the message suggests the nearest ones.
         """
-        known = tuple(floor.name for floor in self.floors)
-        return self.floors[place_of_name(name, known, "floor")]
+        names = tuple(floor.name for floor in self.floors)
+        return self.floors[place_of_name(name, names, "floor")]
 
 
 Stub = tuple[str, tuple[float, float], int]
@@ -279,13 +275,13 @@ def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph,
     `building`: a building with nodes at all ends, as `join_links` returns it; `link`: one of its
     links.
     """
-    found = []
+    stops = []
     for end in link.ends:
         floor = building.floor(end.floor)
         node = node_at(floor.graph, end.position_m)
         assert node is not None  # noqa: S101 - links are joined
-        found.append((floor, node))
-    return found
+        stops.append((floor, node))
+    return stops
 
 
 def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:

@@ -87,8 +87,7 @@ def plot_building(
         floor = building.floors[number]
         canvas = Canvas.opened(axes[number], width_in, views[number])
         # One scale for all: sizes are those of the whole picture.
-        found = _draw_floor(canvas, building, floor, shown)
-        for handle, text in found:
+        for handle, text in _draw_floor(canvas, building, floor, shown):
             # Floors leave out different numbers of names: one entry is enough.
             entries.setdefault(text.partition(" (")[0], handle)
         frame_axes(canvas)

@@ -35,7 +35,6 @@ class ReplayStep:
     number: int
     """Number of the map, from 0."""
     places: OnlinePyramid
-    """The places."""
     rooms: OnlineRooms
     """The newest rooms; they may be some maps old."""
     update: Update | None
@@ -180,8 +179,8 @@ def _first(grid: OccupancyGrid, merge_distance_m: float, labels: RoomLabels | No
     places = OnlinePyramid.of(pyramid)
     built = clock()
     rooms = OnlineRooms.of(grid, labels)
-    found = clock()
-    return ReplayStep(0, places, rooms, None, None, built - began, found - built, None, None)
+    ended = clock()
+    return ReplayStep(0, places, rooms, None, None, built - began, ended - built, None, None)
 
 
 def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayStep:
@@ -191,7 +190,7 @@ def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayS
     update = before.update(grid, changed=changed)
     updated = clock()
     rooms_update = rooms.update(grid) if with_rooms else None
-    found = clock()
+    ended = clock()
     after = update.version
     return ReplayStep(
         step.number + 1,
@@ -200,7 +199,7 @@ def _next(step: ReplayStep, grid: OccupancyGrid, *, with_rooms: bool) -> ReplayS
         update,
         rooms_update,
         updated - began,
-        found - updated if with_rooms else 0.0,
+        ended - updated if with_rooms else 0.0,
         flips_between(_numbered(before), _numbered(after)),
         None
         if rooms_update is None

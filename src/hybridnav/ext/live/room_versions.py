@@ -109,8 +109,8 @@ class OnlineRooms:
         }
         called = {name: f"room-{n}" for n, name in zip(numbers, labels.names, strict=True)}
         number_of = np.append(np.array(numbers, np.int32), np.int32(NO_ROOM))[labels.label_of]
-        found = window.doors_of(number_of, grid, (0, 0), labels.doors)
-        doors = {door.number: door for door in sorted(found, key=lambda door: door.number)}
+        own_doors = window.doors_of(number_of, grid, (0, 0), labels.doors)
+        doors = {door.number: door for door in sorted(own_doors, key=lambda door: door.number)}
         return cls(
             grid,
             frozen(number_of),
@@ -178,9 +178,9 @@ class OnlineRooms:
         settings = self.least_area_m2, self._next[0]
         number_of, events = window.renew(before, grid, outside, differs, settings)
         # How wide a door is, walls decide that lie in no room and at any distance.
-        known = {n: door.position for n, door in self.doors.items()}
+        positions = {n: door.position for n, door in self.doors.items()}
         new_doors, door_events = window.follow_doors(
-            self.doors, window.doors_of(number_of, grid, low, known), self._next[1]
+            self.doors, window.doors_of(number_of, grid, low, positions), self._next[1]
         )
         lost = {n: self.names[n] for n in events.died if n in self.names}
         version = replace(
@@ -304,7 +304,6 @@ class RoomsUpdate:
     """
 
     version: OnlineRooms
-    """The new version."""
     born: tuple[int, ...]
     """Rooms that are none of the old ones; their numbers are new."""
     died: tuple[int, ...]
@@ -367,7 +366,7 @@ class RoomsUpdate:
 
 
 def _numbers(names: tuple[str, ...]) -> list[int]:
-    found = [NUMBERED.fullmatch(name) for name in names]
-    taken = {int(match[1]) for match in found if match}
+    matches = [NUMBERED.fullmatch(name) for name in names]
+    taken = {int(match[1]) for match in matches if match}
     free = iter(n for n in range(1, len(names) + len(taken) + 1) if n not in taken)
-    return [int(match[1]) if match else next(free) for match in found]
+    return [int(match[1]) if match else next(free) for match in matches]

@@ -89,8 +89,8 @@ def beside_rooms(number_of: IntArray, grid: OccupancyGrid) -> BoolArray:
 def box_of_rooms(number_of: IntArray, rooms: Collection[int]) -> Box | None:
     """Return the least box that holds some rooms, walls included; None without any."""
     boxes = ndimage.find_objects(number_of + 1)
-    found = [at for at in (boxes[n] for n in rooms if n < len(boxes)) if at is not None]
-    joined = [Box(at[0].start, at[1].start, at[0].stop, at[1].stop) for at in found]
+    own_boxes = [at for at in (boxes[n] for n in rooms if n < len(boxes)) if at is not None]
+    joined = [Box(at[0].start, at[1].start, at[0].stop, at[1].stop) for at in own_boxes]
     return reduce(Box.joined, joined) if joined else None
 
 
@@ -141,16 +141,16 @@ def _part(
     in it, -1 where rooms are to be found; see `renewed_rooms`."""
     of_rooms, box = box_of_rooms(number_of, touched), bounds(differs)
     box = box if of_rooms is None else box.joined(of_rooms)
-    box, found = _to_find(number_of, free, differs, touched, box)
+    box, to_find = _to_find(number_of, free, differs, touched, box)
     inside = box.inside(_whole(grid))
-    near = within_radius(found, radius_cells=_cells(_MARGIN_M, grid)) & free[inside]
+    near = within_radius(to_find, radius_cells=_cells(_MARGIN_M, grid)) & free[inside]
     beside = np.setdiff1d(number_of[inside][near], [NO_ROOM, *touched])
     window = box.widened(_cells(_CONTEXT_M, grid)).common(_whole(grid))
     inside = window.inside(_whole(grid))
     number = number_of[inside]
     stays = free[inside] & np.isin(number, beside)
     room_of: IntArray = np.where(stays, number, np.int32(LEFT_OUT))
-    room_of[box.inside(window)][found] = NO_ROOM
+    room_of[box.inside(window)][to_find] = NO_ROOM
     return window, room_of
 
 
@@ -171,9 +171,9 @@ def _to_find(
         parts, n_parts = ndimage.label(loose)
         is_kept = np.zeros(n_parts + 1, np.bool_)
         is_kept[parts[loose & (of_touched | differs[inside])]] = True
-        found: BoolArray = is_kept[parts]
-        if not _is_cut_off(found, box, whole):
-            return box, found
+        to_find: BoolArray = is_kept[parts]
+        if not _is_cut_off(to_find, box, whole):
+            return box, to_find
 
 
 def _is_cut_off(mask: BoolArray, box: Box, whole: Box) -> bool:
@@ -312,50 +312,50 @@ class DoorEvents(NamedTuple):
 
 
 def doors_of(
-    number_of: IntArray, grid: OccupancyGrid, low: tuple[int, int], known: Mapping[int, Point]
+    number_of: IntArray, grid: OccupancyGrid, low: tuple[int, int], positions: Mapping[int, Point]
 ) -> list[OnlineDoor]:
     """Return the doors between rooms.
 
     `number_of`: int32 (rows, cols), the number of the room of each cell, -1 for none; `grid`: the
-    map of these cells; `low`: row and column of cell (0, 0) in the lasting numbering; `known`: a
-    point of each door that has a number; see `RoomBoundaries.numbers`.
+    map of these cells; `low`: row and column of cell (0, 0) in the lasting numbering; `positions`:
+    a point of each door that has a number; see `RoomBoundaries.numbers`.
     """
     rooms = np.flatnonzero(np.bincount(number_of.ravel() + 1)[1:])
     dense = np.full(int(rooms.max(initial=NO_ROOM)) + 2, NO_ROOM, np.int32)
     dense[rooms] = np.arange(len(rooms))
     labels = RoomLabels(tuple(f"room-{room}" for room in rooms.tolist()), dense[number_of])
-    found = RoomBoundaries.of(labels, grid, measured_clearance_m(grid))
+    boundaries = RoomBoundaries.of(labels, grid, measured_clearance_m(grid))
     room_of = np.append(rooms, NO_ROOM)
-    numbers = found.numbers(known)
-    order = np.argsort(found.boundary_of, kind="stable")
-    ends = np.cumsum(np.bincount(found.boundary_of, minlength=found.n_boundaries))
-    row, col = np.divmod(found.edges >> 1, grid.shape[1])
-    cracks = ((row + low[0] + _BIAS) << 32) + ((col + low[1] + _BIAS) << 1) + (found.edges & 1)
+    numbers = boundaries.numbers(positions)
+    order = np.argsort(boundaries.boundary_of, kind="stable")
+    ends = np.cumsum(np.bincount(boundaries.boundary_of, minlength=boundaries.n_boundaries))
+    row, col = np.divmod(boundaries.edges >> 1, grid.shape[1])
+    cracks = ((row + low[0] + _BIAS) << 32) + ((col + low[1] + _BIAS) << 1) + (boundaries.edges & 1)
     sides = np.split(cracks[order], ends[:-1])
     return [
         OnlineDoor(
             int(numbers[at]),
-            (int(room_of[found.labels[at, 0]]), int(room_of[found.labels[at, 1]])),
-            (float(found.middles[at, 0]), float(found.middles[at, 1])),
-            float(found.widths_m[at]),
-            float(found.passages_m[at]),
+            (int(room_of[boundaries.labels[at, 0]]), int(room_of[boundaries.labels[at, 1]])),
+            (float(boundaries.middles[at, 0]), float(boundaries.middles[at, 1])),
+            float(boundaries.widths_m[at]),
+            float(boundaries.passages_m[at]),
             frozen(sides[at]),
         )
-        for at in range(found.n_boundaries)
+        for at in range(boundaries.n_boundaries)
     ]
 
 
 def follow_doors(
-    before: Mapping[int, OnlineDoor], found: Iterable[OnlineDoor], first_number: int
+    before: Mapping[int, OnlineDoor], after: Iterable[OnlineDoor], first_number: int
 ) -> tuple[dict[int, OnlineDoor], DoorEvents]:
     """Return the doors after a change, and what became of those before.
 
-    Doors found that are none of the old ones have numbers that none of these has.
+    Doors that are none of the old ones have numbers that none of these has.
     `first_number` is the least number that no door has had.
     """
     doors: dict[int, OnlineDoor] = {}
     born: list[int] = []
-    for door in sorted(found, key=lambda door: door.number):
+    for door in sorted(after, key=lambda door: door.number):
         number = door.number
         if number not in before:
             number = first_number + len(born)

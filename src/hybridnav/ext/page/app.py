@@ -203,8 +203,8 @@ class _Answers:
             raise InvalidValueError("a tile has three whole numbers")
         zoom, row, col = map(int, numbers)
         theme: Theme = "dark" if request.query_params.get("theme") == "dark" else "light"
-        found: bytes = self._floor(request).layer(place["layer"]).png(zoom, row, col, theme)
-        return found
+        png: bytes = self._floor(request).layer(place["layer"]).png(zoom, row, col, theme)
+        return png
 
 
 def _error(message: str, code: int) -> JSONResponse:
@@ -229,10 +229,10 @@ async def _done(work: Callable[[], Any]) -> Any:
 
 def _get(read: Callable[[Any], Any], kind: str) -> Any:
     async def answer(request: Request) -> Response:
-        found = await _done(lambda: read(request))
-        if isinstance(found, Response):
-            return found
-        return Response(found, media_type=kind, headers={"cache-control": "no-cache"})
+        content = await _done(lambda: read(request))
+        if isinstance(content, Response):
+            return content
+        return Response(content, media_type=kind, headers={"cache-control": "no-cache"})
 
     return answer
 
@@ -263,10 +263,10 @@ def _post_file(read: Callable[[Request, Any], tuple[str, bytes]]) -> Any:
         value = await _body(request)
         if isinstance(value, Response):
             return value
-        found = await _done(lambda: read(request, value))
-        if isinstance(found, Response):
-            return found
-        name, content = found
+        file = await _done(lambda: read(request, value))
+        if isinstance(file, Response):
+            return file
+        name, content = file
         headers = {
             "content-disposition": f'attachment; filename="{name}"',
             "cache-control": "no-store",
@@ -276,10 +276,10 @@ def _post_file(read: Callable[[Request, Any], tuple[str, bytes]]) -> Any:
     return answer
 
 
-def _json(found: Any) -> Response:
-    if isinstance(found, Response):
-        return found
-    return JSONResponse(found, headers={"cache-control": "no-store"})
+def _json(answer: Any) -> Response:
+    if isinstance(answer, Response):
+        return answer
+    return JSONResponse(answer, headers={"cache-control": "no-store"})
 
 
 async def _body(request: Request) -> Any:

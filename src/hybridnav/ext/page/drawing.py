@@ -38,10 +38,10 @@ _FLAT = 3
 
 def known_box(grid: OccupancyGrid) -> list[int]:
     """Return the box of the cells that are not unexplored: first and last column and row."""
-    known: BoolArray = grid.measured != CellClass.UNEXPLORED
-    if not known.any():
+    is_explored: BoolArray = grid.measured != CellClass.UNEXPLORED
+    if not is_explored.any():
         return [0, grid.shape[1], 0, grid.shape[0]]
-    rows, cols = np.flatnonzero(known.any(axis=1)), np.flatnonzero(known.any(axis=0))
+    rows, cols = np.flatnonzero(is_explored.any(axis=1)), np.flatnonzero(is_explored.any(axis=0))
     return [int(cols[0]), int(cols[-1]) + 1, int(rows[0]), int(rows[-1]) + 1]
 
 
@@ -107,7 +107,7 @@ def room_facts(rooms: Rooms) -> dict[str, Any]:
     shows to people."""
     shown = {door.number for door in rooms.listed_doors}
     leading = {door.number for door in leading_doors(rooms)}
-    found = [
+    listed = [
         {
             "name": name,
             "area_m2": round(area, 2),
@@ -126,7 +126,7 @@ def room_facts(rooms: Rooms) -> dict[str, Any]:
         )
     ]
     return {
-        "rooms": sorted(found, key=lambda room: natural_key(room["name"])),
+        "rooms": sorted(listed, key=lambda room: natural_key(room["name"])),
         "doors": [
             _door(door, rooms) | {"listed": door.number in shown, "leads": door.number in leading}
             for door in rooms.doors
@@ -146,15 +146,15 @@ def _spots(rooms: Rooms) -> list[list[int]]:
     # Loads scipy's filters, which the rest of the page does not need.
     from scipy.ndimage import find_objects  # noqa: PLC0415
 
-    found = []
+    spots = []
     for label, box in enumerate(find_objects(inside + 1, max_label=len(rooms.names))):
         if box is None:  # no free cell: nothing is written on the map
-            found.append([0, 0, 0, 0])
+            spots.append([0, 0, 0, 0])
             continue
         row, col = (part.start for part in box)
         top, bottom, left, right = _widest(inside[box] == label)
-        found.append([col + left, col + right, row + top, row + bottom])
-    return found
+        spots.append([col + left, col + right, row + top, row + bottom])
+    return spots
 
 
 def _widest(inside: BoolArray) -> tuple[int, int, int, int]:
@@ -169,7 +169,7 @@ def _widest(inside: BoolArray) -> tuple[int, int, int, int]:
     shares = padded.reshape(rows, step, cols, step).mean(axis=(1, 3))
     whole = shares >= min(_WHOLE, float(shares.max()))
     here, number = whole, np.arange(cols)
-    best, found = (0, 0), (0, 1, 0, 1)
+    best, area = (0, 0), (0, 1, 0, 1)
     for high in range(1, rows + 1):
         if high > 1:
             here = here[:-1] & whole[high - 1 :]
@@ -178,8 +178,8 @@ def _widest(inside: BoolArray) -> tuple[int, int, int, int]:
         wide = int(number[last] - gap[row, last])
         score = (min(wide, _FLAT * high), wide * high)
         if wide and score > best:
-            best, found = score, (int(row), int(row) + high, int(last) - wide + 1, int(last) + 1)
-    top, bottom, left, right = (step * n for n in found)
+            best, area = score, (int(row), int(row) + high, int(last) - wide + 1, int(last) + 1)
+    top, bottom, left, right = (step * n for n in area)
     return top, min(bottom, inside.shape[0]), left, min(right, inside.shape[1])
 
 
@@ -293,16 +293,16 @@ class PagePlanning:
         """Return some routes by other doors."""
         start, goal = self._points(query)
         planner, closed = self._under(query), self._closed(query)
-        found = plan_alternatives(planner, start, goal, query.count, blocked=closed)
+        paths = plan_alternatives(planner, start, goal, query.count, blocked=closed)
         routes = [
             self._facts(each.result)
             | self._itinerary(
                 tour_of(planner, [each.result], ask.named_ends(query, (start, goal))),
                 query.language,
             )
-            for each in found
+            for each in paths
         ]
-        return {"routes": routes, "complete": found.complete, "note": found.note}
+        return {"routes": routes, "complete": paths.complete, "note": paths.note}
 
     def _points(self, query: ask.PathQuery) -> tuple[tuple[float, ...], tuple[float, ...]]:
         start, goal = (ask.in_metres(end.point, self.grid) for end in (query.start, query.goal))

@@ -44,15 +44,8 @@ class Closings:
     def describe(self, change: ClosingChange | None = None) -> dict[str, Any]:
         """Return the profiles with their demands, and things that are out of order, after a change.
 
-        Parameters
-        ----------
-        change
-            What to close or to open; None for nothing.
-
-        Raises
-        ------
-        HybridNavError
-            When it is not there, or the journal cannot be read or written, or there is none.
+        Raise `HybridNavError` when what is to be closed or opened is not there, or the journal
+        cannot be read or written, or there is none.
         """
         journal = self.journal
         if change is not None:
@@ -111,9 +104,9 @@ class RoomsFile:
         `since_told`: whether to overlook the change that the last call returned.
         """
         now = self._digest()
-        known = {self._seen, self._told} if since_told else {self._seen}
+        digests = {self._seen, self._told} if since_told else {self._seen}
         self._told = now
-        return now not in known
+        return now not in digests
 
     def save(self, rooms: RoomLabels, grid: OccupancyGrid) -> None:
         """Write rooms whole or not at all, and end the journal.
@@ -148,8 +141,8 @@ class RoomsFile:
             self._check_inside(self.journal)
             if self.journal.stat().st_size > _MOST_BYTES:
                 return []
-            found = json.loads(self.journal.read_text(encoding="utf-8"))
-            changes = found.get("changes") if isinstance(found, dict) else None
+            content = json.loads(self.journal.read_text(encoding="utf-8"))
+            changes = content.get("changes") if isinstance(content, dict) else None
             return changes if isinstance(changes, list) else []
         return []
 
@@ -184,8 +177,8 @@ class Finder:
         self._kept: dict[str, list[list[str]]] = {}
         with suppress(OSError, ValueError, TypeError, AttributeError, RecursionError):
             if not self._file.is_symlink() and self._file.stat().st_size <= _MOST_OF_FAVOURITES:
-                found = json.loads(self._file.read_text(encoding="utf-8"))
-                self._kept = {name: _pairs(pairs) for name, pairs in found.items()}
+                content = json.loads(self._file.read_text(encoding="utf-8"))
+                self._kept = {name: _pairs(pairs) for name, pairs in content.items()}
 
     def find(self, site: Named, asked: Find) -> dict[str, Any]:
         """Return the rooms and points that a text may mean, the best first: `FLOOR:NAME`, or a name
@@ -195,19 +188,19 @@ class Finder:
         for number, name in enumerate(site.floors):
             if colon and folded(before) == folded(name):
                 floor, text = number, after
-        known = [named for named in site.places if floor in {None, named[0]}]
+        places = [named for named in site.places if floor in {None, named[0]}]
         kept = self._kept.get(site.name, [])
-        found = [
+        matches = [
             {
-                "floor": known[at][0],
-                "name": known[at][1],
-                "same": folded(known[at][1]) == folded(text),
-                "favourite": [site.floors[known[at][0]], known[at][1]] in kept,
+                "floor": places[at][0],
+                "name": places[at][1],
+                "same": folded(places[at][1]) == folded(text),
+                "favourite": [site.floors[places[at][0]], places[at][1]] in kept,
             }
-            for at in matching(text, [name for _, name in known])
+            for at in matching(text, [name for _, name in places])
         ]
-        found.sort(key=lambda each: (not each["same"], not each["favourite"]))
-        return {"found": found[:_MOST_FOUND]}
+        matches.sort(key=lambda each: (not each["same"], not each["favourite"]))
+        return {"found": matches[:_MOST_FOUND]}
 
     def favour(self, site: Named, asked: Favour) -> dict[str, Any]:
         """Keep a room or point as a favourite, or no longer.

@@ -141,10 +141,10 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
     most = _MOST_CELLS // len(site.sessions)
     ends = _ends(site)
     asked = [_between(site, *pair) for pair in product(ends, ends)]
-    found = [_in_languages(site, query) for query in asked]
-    matrix = [found[at : at + len(ends)] for at in range(0, len(found), len(ends) or 1)]
+    plans = [_in_languages(site, query) for query in asked]
+    matrix = [plans[at : at + len(ends)] for at in range(0, len(plans), len(ends) or 1)]
     if ends and not queries:
-        queries = [asked[max(range(len(found)), key=lambda at: _length_m(found[at]))]]
+        queries = [asked[max(range(len(plans)), key=lambda at: _length_m(plans[at]))]]
     floors = [_map(session, most) for session in site.sessions]
     if len(floors) == 1:
         _add_heights(floors[0], site.sessions[0], ends, matrix)
@@ -162,7 +162,7 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
         replace_file(Path(path), whole_page(data).encode())
     except OSError as error:
         raise MapError(f"page {printable(path)}: cannot write: {error.strerror}") from None
-    return len(found) + len(queries)
+    return len(plans) + len(queries)
 
 
 def _ends(site: Site) -> list[dict[str, Any]]:
@@ -170,14 +170,14 @@ def _ends(site: Site) -> list[dict[str, Any]]:
     preset = site.routes().presets[0]
     if any(one.planning.planner(preset).preset.planner.sampling for one in site.sessions):
         return []
-    found = []
+    candidates = []
     for number, session in enumerate(site.sessions):
         rooms = session.planning.topology.rooms
         named = zip(rooms.names, rooms.areas_m2.tolist(), rooms.fits & rooms.is_listed, strict=True)
-        found += [(-area, number, name) for name, area, is_end in named if is_end]
+        candidates += [(-area, number, name) for name, area, is_end in named if is_end]
     return [
         {"floor": number} | site.sessions[number].stand(Stand(name=name))
-        for _, number, name in sorted(found)[:_MOST_ENDS]
+        for _, number, name in sorted(candidates)[:_MOST_ENDS]
     ]
 
 
@@ -237,7 +237,7 @@ def _tiles(layer: MapLayer, most_cells: int, *, is_overlay: bool = False) -> dic
     first = 0
     while (rows >> first) * (cols >> first) > most_cells:
         first += 1
-    found = {}
+    tiles = {}
     last = first if is_overlay else max(layer.n_zooms - 1, first)
     for zoom in range(first, last + 1):
         side = TILE << zoom
@@ -245,8 +245,8 @@ def _tiles(layer: MapLayer, most_cells: int, *, is_overlay: bool = False) -> dic
             for row in range(-(-rows // side)):
                 for col in range(-(-cols // side)):
                     content = base64.b64encode(layer.png(zoom, row, col, theme, 9)).decode()
-                    found[f"{theme}/{zoom}/{row}/{col}"] = f"data:image/png;base64,{content}"
-    return {"first": first, "last": last, "found": found}
+                    tiles[f"{theme}/{zoom}/{row}/{col}"] = f"data:image/png;base64,{content}"
+    return {"first": first, "last": last, "found": tiles}
 
 
 # Files that the page hands out: route graph, model, path, rooms.
@@ -295,9 +295,9 @@ def exported_floor(session: Session, kind: str, folder: Path) -> tuple[str, byte
     return _content(kind, lambda file: export_rooms(topology.rooms, file), folder)
 
 
-def _check_kind(kind: str, known: Sequence[str]) -> None:
-    if kind not in known:
-        raise InvalidValueError(f"a file is one of {', '.join(known)}, got {kind!r:.80}")
+def _check_kind(kind: str, kinds: Sequence[str]) -> None:
+    if kind not in kinds:
+        raise InvalidValueError(f"a file is one of {', '.join(kinds)}, got {kind!r:.80}")
 
 
 def _content(kind: str, write: Callable[[Path], None], folder: Path) -> tuple[str, bytes]:

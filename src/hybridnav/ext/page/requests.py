@@ -215,8 +215,8 @@ def checked_change(value: dict[str, Any]) -> Change:
     kind = _KINDS.get(op) if isinstance(op, str) else None
     if kind is None:
         raise InvalidValueError(f"op must be one of {', '.join(_KINDS)}, got {op!r:.80}")
-    found: Change = checked(kind, value)
-    return found
+    change: Change = checked(kind, value)
+    return change
 
 
 # Changes of rooms: names, unions, cuts along a line, corners of outlines.
@@ -354,8 +354,8 @@ def in_grid(points_m: ArrayLike, grid: OccupancyGrid) -> list[Any]:
     points = np.asarray(points_m, dtype=np.float64)
     if not points.size:
         return []
-    found: list[Any] = np.round(grid.frame.positions_of(points)[..., ::-1], _DECIMALS).tolist()
-    return found
+    positions: list[Any] = np.round(grid.frame.positions_of(points)[..., ::-1], _DECIMALS).tolist()
+    return positions
 
 
 def in_metres(point: Sequence[float], grid: OccupancyGrid) -> tuple[float, float]:

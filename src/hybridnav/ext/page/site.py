@@ -147,13 +147,13 @@ class Site:
     @property
     def named(self) -> Named:
         """The rooms that the robot fits in, and all points, each with the number of its floor."""
-        found: list[tuple[int, str]] = []
+        pairs: list[tuple[int, str]] = []
         for number, session in enumerate(self.sessions):
             rooms = session.planning.topology.rooms
             fitting = [name for name, fits in zip(rooms.names, rooms.fits, strict=True) if fits]
             points = [name for name in rooms.labels.points if name not in rooms.names]
-            found += [(number, name) for name in (*fitting, *points)]
-        return Named(self.name, self.names, found)
+            pairs += [(number, name) for name in (*fitting, *points)]
+        return Named(self.name, self.names, pairs)
 
     def building(self, preset: str) -> Building:
         """Return the building with planners by a preset, of the rooms as they are now.
@@ -335,8 +335,8 @@ class _OverFloors:
     def alternatives(self, query: AlternativesQuery) -> dict[str, Any]:
         start, goal = self._ends(query)
         building, how = self.building(query.preset), self._how(query)
-        found = building.alternatives(start, goal, query.count, **how)
-        routes = [self._facts(plan, query.language) | self._words(plan, query) for plan in found]
+        plans = building.alternatives(start, goal, query.count, **how)
+        routes = [self._facts(plan, query.language) | self._words(plan, query) for plan in plans]
         few = len(routes) < query.count
         note = "there are no more routes by other links up to twice as dear" if few else ""
         return {"routes": routes, "complete": not few, "note": note}

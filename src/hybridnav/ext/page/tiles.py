@@ -109,14 +109,14 @@ class MapLayer:
             return self.tables[theme][part]
         key = (theme, zoom, row, col)
         with self._lock:
-            found = self._kept.get(key)
-        if found is None:
-            found = self._halved(zoom, row, col, theme)
+            tile = self._kept.get(key)
+        if tile is None:
+            tile = self._halved(zoom, row, col, theme)
             with self._lock:
-                self._kept[key] = found
+                self._kept[key] = tile
                 while len(self._kept) > _MOST_KEPT:
                     self._kept.popitem(last=False)
-        return found
+        return tile
 
     def _halved(self, zoom: int, row: int, col: int, theme: Theme) -> ByteArray:
         """Return the average of the four tiles of the next finer size."""

@@ -268,7 +268,6 @@ def with_glances(  # noqa: C901 - a door is seen, led to by a wall, or walked to
 
 
 def _wall_between(before: Event, event: Event, landmarks: Landmarks) -> Wall | None:
-    """Return the wall that leads from one door to the next."""
     if not before.stretch.doors:
         return None
     most_m = _LEAST_WALL_M + _DETOUR * (event.at_m - before.at_m)

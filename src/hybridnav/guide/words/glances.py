@@ -84,14 +84,14 @@ class DoorsInSight:
     def _doors_of(self) -> dict[str | None, list[Door]]:
         """The doors that a person notices, by the room on each side: no boundary all round, as that
         of a zone inside a hall."""
-        found: dict[str | None, list[Door]] = {}
+        doors: dict[str | None, list[Door]] = {}
         for door in self._rooms.listed_doors:
             is_wide = door.width_m >= NARROWEST_M or door.passable
             is_ring = math.isnan(self.way_out_rad(door, is_forward=True))
             if is_wide and door.passage_m >= NARROWEST_M and not is_ring:
                 for room in set(door.rooms):
-                    found.setdefault(room, []).append(door)
-        return found
+                    doors.setdefault(room, []).append(door)
+        return doors
 
     def way_out_rad(self, door: Door, *, is_forward: bool) -> float:
         """Return the direction in which one passes a door at right angles.
@@ -293,7 +293,6 @@ class DoorsInSight:
         return any(self._is_free(point, end) for end in self._span(door).tolist())
 
     def _is_seen(self, point: list[float], door: Door) -> bool:
-        """Return whether no occupied cell lies between a point and the middle of a door."""
         return self._is_free(point, list(door.position))
 
     def _is_free(self, point: list[float], end: list[float]) -> bool:

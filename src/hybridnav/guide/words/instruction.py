@@ -185,9 +185,7 @@ class FloorChange:
     """
 
     link: str
-    """Name of the link."""
     kind: Vehicle
-    """What it is."""
     floor: str
     """Name of the floor to which it leads."""
     has_exit: bool = False

@@ -163,7 +163,7 @@ def _after(event: Event, doorway: Doorway | None, since: _Since, landmarks: Land
 
 
 def _doorway(
-    line: Line, event: Event, following: Stretch, landmarks: Landmarks, known: tuple[_Since, float]
+    line: Line, event: Event, following: Stretch, landmarks: Landmarks, span: tuple[_Since, float]
 ) -> Doorway:
     """Return a crossing for sentences: its door, and how the path comes and goes.
 
@@ -171,7 +171,7 @@ def _doorway(
     hand at which the door lies may be the turn into it: the way on is then told as one who stands
     in the door sees it.
     """
-    door, (since, until_m) = event.door, known
+    door, (since, until_m) = event.door, span
     doorway = Doorway(following.space, is_first=since.is_first, behind=_turn_of(event.behind))
     if door is None:
         return doorway
@@ -182,9 +182,9 @@ def _doorway(
         passage_m=door.passage_m,
         is_opening=door.is_opening,
     )
-    found = event.glance or event.wall
-    if found is None:
-        doorway = _on_the_way(line, event, landmarks, doorway, known)
+    sign = event.glance or event.wall
+    if sign is None:
+        doorway = _on_the_way(line, event, landmarks, doorway, span)
     else:
         way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
         goes_rad = _heading(line, event.at_m, until_m - event.at_m)
@@ -192,7 +192,7 @@ def _doorway(
         doorway = replace(
             doorway,
             beside=None if event.glance is None else event.glance.side,
-            ordinal=found.ordinal,
+            ordinal=sign.ordinal,
             wall=event.wall,
             is_seen=event.glance is not None,
             onward=onward if doorway.behind is None else None,
@@ -201,12 +201,12 @@ def _doorway(
 
 
 def _on_the_way(
-    line: Line, event: Event, landmarks: Landmarks, doorway: Doorway, known: tuple[_Since, float]
+    line: Line, event: Event, landmarks: Landmarks, doorway: Doorway, span: tuple[_Since, float]
 ) -> Doorway:
     """Return a crossing with its place for a person who has to walk to it."""
-    since, door = known[0], event.door
+    since, door = span[0], event.door
     assert door is not None  # noqa: S101 - the caller has seen one
-    doorway = _beside(line, event, known, landmarks, doorway)
+    doorway = _beside(line, event, span, landmarks, doorway)
     hand = doorway.beside if event.turn is None else Turn(event.turn.angle_rad).hand
     is_back = event.turn is not None and Turn(event.turn.angle_rad).is_sharp
     if hand not in ("left", "right") or is_back:
@@ -217,10 +217,10 @@ def _on_the_way(
 
 
 def _beside(
-    line: Line, event: Event, known: tuple[_Since, float], landmarks: Landmarks, doorway: Doorway
+    line: Line, event: Event, span: tuple[_Since, float], landmarks: Landmarks, doorway: Doorway
 ) -> Doorway:
     """Return a crossing with the hand at which its door lies, and the way on behind it."""
-    (since, until_m), door = known, event.door
+    (since, until_m), door = span, event.door
     assert door is not None  # noqa: S101 - the caller has seen one
     way = landmarks.way_out_rad(door, is_forward=event.leads_forward)
     before_m, behind_m = event.at_m - since.at_m, until_m - event.at_m

@@ -57,7 +57,7 @@ class Guide:
         cell path; `waypoint`: waypoint at the end of the path. Result: at least one leg; the
         lengths sum to that of the path.
         """
-        found = visits_of(self._rooms, self._route_finder, path.cells, path.length_m)
+        visits = visits_of(self._rooms, self._route_finder, path.cells, path.length_m)
         legs = [
             Leg(
                 self._rooms.name_of(one.label),
@@ -66,7 +66,7 @@ class Guide:
                 endpoint=one.end,
                 shape=self._shape(one.vertex, one.cells),
             )
-            for one in found
+            for one in visits
         ]
         x, y = path.points[-1].tolist()
         return [*legs[:-1], replace(legs[-1], waypoint=waypoint, endpoint=(x, y))]
@@ -122,7 +122,6 @@ def guide_of(planner: HybridPlanner) -> Guide | None:
 
 
 def _guide_on(topology: TopologicalMap) -> Guide:
-    """Return what describes paths on a map with rooms, made once."""
     guide = _GUIDES.get(topology)
     if guide is None:
         guide = _GUIDES[topology] = Guide(topology.rooms)

@@ -76,39 +76,40 @@ class Landmarks(DoorsInSight):
     def from_a_door(
         self, point: tuple[float, float], door: Door, room: str | None, most_m: float
     ) -> Wall | None:
-        """Return how a wall leads a person to a door who goes to one of the nearest first.
+        """Return the way to one of the nearest doors and along a wall to another, None for none.
 
         The parameters are those of `along_a_wall`, but for the point where the person looks round.
+        A nearest door counts while each is clearly nearer than the next one, or nobody can tell
+        which is meant.
         """
         if room is None or self._is_corridor(room):
             return None
-        near = sorted(
-            (dist(point, one.position), one.number)
-            for one in self._doors_of.get(room, ())
-            if not one.is_opening and self._is_seen_in_part(list(point), one)
+        visible = sorted(
+            (dist(point, near.position), near.number)
+            for near in self._doors_of.get(room, ())
+            if not near.is_opening and self._is_seen_in_part(list(point), near)
         )
-        found = []
-        for at, (away_m, number) in enumerate(near[:FEW]):
-            after_m = near[at + 1][0] if at + 1 < len(near) else math.inf
-            if after_m - away_m < NEARER_M:
-                break
+        farther_m = [*(away_m for away_m, _ in visible[1:]), math.inf]
+        for rank, (away_m, number) in enumerate(visible[:FEW]):
+            if farther_m[rank] - away_m < NEARER_M:
+                return None
             wall = self._by_walls(number, door, room, most_m - away_m)
             if wall is not None and wall.via is None:
-                found.append(replace(wall, via=Wall(None, at + 1)))
-        return found[0] if found else None
+                return replace(wall, via=Wall(None, rank + 1))
+        return None
 
     def _by_walls(
         self, came_by: int, door: Door, room: str, most_m: float, beyond: str | None = None
     ) -> Wall | None:
         is_read = is_named(beyond) and beyond is not None
-        found = [
+        ways = [
             (length_m, wall)
             for length_m, number, wall in self._led(came_by, room)
             if number == door.number and length_m <= most_m
             if wall.ordinal is not None or is_read
         ]
-        if not found:
-            found = [
+        if not ways:
+            ways = [
                 (to_m + on_m, replace(onward, via=wall))
                 for to_m, via, wall in self._led(came_by, room)
                 if via != door.number and to_m < most_m and wall.ordinal is not None
@@ -117,7 +118,7 @@ class Landmarks(DoorsInSight):
                 if number == door.number and to_m + on_m <= most_m
                 if onward.ordinal is not None or is_read
             ]
-        return min(found, key=lambda one: one[0])[1] if found else None
+        return min(ways, key=lambda one: one[0])[1] if ways else None
 
     def _led(self, came_by: int, room: str) -> list[tuple[float, int, Wall]]:
         """Return to which doors walls lead a person from a door of a room, and how far they are.
@@ -229,7 +230,7 @@ class Landmarks(DoorsInSight):
         the room, anywhere.
         """
         point, heading_rad = line.at(0.0), line.first_heading()
-        found: list[tuple[int, float, int, Landmark]] = []
+        marks: list[tuple[int, float, int, Landmark]] = []
         for door in self._doors_of.get(room, ()):
             away_m, is_exit = dist(point, door.position), door.number in exits
             is_far = away_m > _FARTHEST_M and not is_exit
@@ -246,8 +247,8 @@ class Landmarks(DoorsInSight):
                 return replace(seen, side="ahead")
             if self._is_seen(list(point), door):
                 rank = (0 if seen.side.startswith("ahead") else 2) if is_exit else 1
-                found.append((rank, away_m, door.number, seen))
-        return min(found, key=lambda one: one[:3])[3] if found else None
+                marks.append((rank, away_m, door.number, seen))
+        return min(marks, key=lambda one: one[:3])[3] if marks else None
 
     def at_goal(
         self, point: tuple[float, float], heading_rad: float, room: str | None, but: Collection[int]

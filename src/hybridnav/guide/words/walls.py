@@ -127,11 +127,11 @@ class RoomWalls:
         """
         lengths, sign = self._lengths[begin[0]], 1 if hand == "right" else -1
         length = float(lengths[-1]) or math.inf  # round a cell nobody walks
-        found = []
+        reached = []
         for number, first, last in self.walls[begin[0]]:
             at = first if hand == "right" else last
-            found.append((float(sign * (lengths[at] - lengths[begin[1]]) % length), number))
-        yield from ((number, away) for away, number in sorted(found))
+            reached.append((float(sign * (lengths[at] - lengths[begin[1]]) % length), number))
+        yield from ((number, away) for away, number in sorted(reached))
 
 
 def _sides_of(inside: BoolArray) -> tuple[LongArray, LongArray]:

@@ -104,11 +104,11 @@ def check_language(language: str) -> Language:
     >>> check_language("de").turn_round
     'umkehren'
     """
-    found = _LANGUAGES.get(language) if isinstance(language, str) else None
-    if found is None:
-        known = ", ".join(f"{code} ({name})" for code, name in languages().items())
-        raise InvalidValueError(f"language must be one of {known}, got {language!r:.80}")
-    return found
+    table = _LANGUAGES.get(language) if isinstance(language, str) else None
+    if table is None:
+        codes = ", ".join(f"{code} ({name})" for code, name in languages().items())
+        raise InvalidValueError(f"language must be one of {codes}, got {language!r:.80}")
+    return table
 
 
 def sentences(instructions: Sequence[Instruction], language: str = "en") -> list[str]:
@@ -313,7 +313,6 @@ class _Writer:
         )
 
     def _beside(self, side: Side) -> str:
-        """Return the words for where a door lies."""
         return self.words.ahead if side == "ahead" else self._place(side)
 
     def _out(self, doorway: Doorway) -> str:

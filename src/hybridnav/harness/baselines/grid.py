@@ -43,16 +43,16 @@ class GridAstar:
     def solve(self, start: Cell, goal: Cell) -> MethodResult:
         """Find a shortest path between two free cells, or a cheapest one; the bound is its own."""
         began = clock()
-        found = self._search.search(start, goal)
+        answer = self._search.search(start, goal)
         seconds = {"refine": clock() - began}
-        if self._costs is not None and found.cells is not None:
-            cost_m = self._costs.cost_of_cells(found.cells) * self._resolution_m
+        if self._costs is not None and answer.cells is not None:
+            cost_m = self._costs.cost_of_cells(answer.cells) * self._resolution_m
             claim = CostClaim(cost_m, cost_m)
             return MethodResult(
-                found.cells, by_costs=claim, expanded=found.expanded, seconds=seconds
+                answer.cells, by_costs=claim, expanded=answer.expanded, seconds=seconds
             )
-        bound = math.inf if found.cells is None else 1.0
-        return MethodResult(found.cells, bound=bound, expanded=found.expanded, seconds=seconds)
+        bound = math.inf if answer.cells is None else 1.0
+        return MethodResult(answer.cells, bound=bound, expanded=answer.expanded, seconds=seconds)
 
 
 class GridDijkstra:
@@ -76,10 +76,10 @@ class GridDijkstra:
         """Find a shortest path between two free cells; the bound is 1."""
         began = clock()
         with self._works.lent() as work:
-            found, expanded = work.search(_kernels.dijkstra, start, goal)
-            cells = work.path(start, goal) if found else None
+            has_path, expanded = work.search(_kernels.dijkstra, start, goal)
+            cells = work.path(start, goal) if has_path else None
         seconds = {"refine": clock() - began}
-        bound = 1.0 if found else math.inf
+        bound = 1.0 if has_path else math.inf
         return MethodResult(cells, bound=bound, expanded=expanded, seconds=seconds)
 
 

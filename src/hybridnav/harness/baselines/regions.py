@@ -62,14 +62,14 @@ class RegionPlanner:
             return MethodResult(None, expanded_nodes=plan.expanded, seconds=seconds)
         began = clock()
         in_corridor = along(self._joined, plan.vertices, self._beside, self._graph.allowed)
-        found = self._grid_search.search(
+        answer = self._grid_search.search(
             start, goal, field_of=self._region_of, in_corridor=in_corridor
         )
         seconds["refine"] = clock() - began
         return MethodResult(
-            found.cells,
+            answer.cells,
             nodes=tuple(plan.vertices.tolist()),
-            expanded=found.expanded,
+            expanded=answer.expanded,
             expanded_nodes=plan.expanded,
             seconds=seconds,
         )

@@ -139,16 +139,16 @@ def contacts_of(
     is_new = np.append(True, ranges[1:, 0] - np.maximum.accumulate(ranges[:-1, 1]) > kernels.SMALL)
     group = np.flatnonzero(is_new)
     places = first + deepest[:, :1] * (last - first)
-    per_cell, found = grid.resolution_m, []
+    per_cell, contacts = grid.resolution_m, []
     for low, high in zip(group, np.append(group[1:], len(spans)), strict=True):
         at = int(low + np.argmax(deepest[low:high, 1]))
         x, y = grid.frame.points_of_grid(places[at]).tolist()
         depth, begin, end = deepest[at, 1], ranges[low, 0], ranges[low:high, 1].max()
         what = "corner" if depth <= kernels.SMALL and begin == end else _what(grid, places[at])
-        found.append(
+        contacts.append(
             Contact(what, x, y, *(float(value) * per_cell for value in (depth, begin, end)))
         )
-    return tuple(found)
+    return tuple(contacts)
 
 
 def _what(grid: OccupancyGrid, position: FloatArray) -> str:

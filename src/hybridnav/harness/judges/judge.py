@@ -220,18 +220,14 @@ def _wrong_endpoints(path: LongArray, start: Cell, goal: Cell) -> list[str]:
 
 
 def _about_cells(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
-    where = np.flatnonzero(wrong)
-    if not len(where):
-        return []
-    return [f"cell {_cell(path[where[0]])} is {what}{more(len(where))}"]
+    where = np.flatnonzero(wrong).tolist()
+    return [f"cell {_cell(path[at])} is {what}{more(len(where))}" for at in where[:1]]
 
 
 def _about_steps(path: LongArray, wrong: BoolArray, what: str) -> list[str]:
-    where = np.flatnonzero(wrong)
-    if not len(where):
-        return []
-    tail, head = path[where[0]], path[where[0] + 1]
-    return [f"the step from {_cell(tail)} to {_cell(head)} {what}{more(len(where))}"]
+    where = np.flatnonzero(wrong).tolist()
+    ends = [(_cell(path[at]), _cell(path[at + 1])) for at in where[:1]]
+    return [f"the step from {tail} to {head} {what}{more(len(where))}" for tail, head in ends]
 
 
 def _cut_corners(

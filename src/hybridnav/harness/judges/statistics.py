@@ -42,7 +42,6 @@ class PairedDifference:
     """Difference of two methods on the same pairs."""
 
     n: int
-    """Pairs compared."""
     dropped: int
     """Pairs left out because one of the two values is not finite."""
     mean: float
@@ -208,9 +207,9 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
     array([0, 0, 1])
     """
     lengths = np.asarray(optima_m, dtype=np.float64).ravel()
-    known = np.isfinite(lengths)
+    is_finite = np.isfinite(lengths)
     if edges is None:
-        longest = float(lengths[known].max(initial=1.0))
+        longest = float(lengths[is_finite].max(initial=1.0))
         mantissa, power = math.frexp(longest)
         cuts = np.ldexp(1.0, np.arange(max(power - (mantissa == 0.5), 1)))  # noqa: PLR2004
     else:
@@ -224,7 +223,7 @@ def distance_buckets(optima_m: ArrayLike, *, edges: ArrayLike | None = None) -> 
         f"{names[-1]} m and more",
     )
     indices = np.searchsorted(cuts, lengths, side="right")
-    return Buckets(labels, np.where(known, indices, -1).astype(np.int64))
+    return Buckets(labels, np.where(is_finite, indices, -1).astype(np.int64))
 
 
 def thrun_count(n_nodes: float, mean_plan_length: float) -> float:
@@ -265,7 +264,7 @@ def _interval_of_mean(values: FloatArray, rng: np.random.Generator, resamples: i
     if np.ptp(values) == 0:
         return float(values[0]), float(values[0])
     batch = max(_CHUNK // len(values), 1)
-    found = stats.bootstrap(
+    bootstrap = stats.bootstrap(
         (values,), np.mean, n_resamples=resamples, batch=batch, method="percentile", rng=rng
     )
-    return float(found.confidence_interval.low), float(found.confidence_interval.high)
+    return float(bootstrap.confidence_interval.low), float(bootstrap.confidence_interval.high)

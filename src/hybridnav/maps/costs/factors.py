@@ -312,13 +312,13 @@ def mask_on_map(
         return values
     frame = grid.frame if frame is None else frame
     rows, cols = grid.shape
-    found = np.full(grid.shape, _UNKNOWN, dtype=np.int8)
+    mask = np.full(grid.shape, _UNKNOWN, dtype=np.int8)
     for first in range(0, rows, _ROWS):
         strip = np.mgrid[first : min(first + _ROWS, rows), :cols]
         cells = frame.cells_of(grid.frame.points_of(np.moveaxis(strip, 0, -1)))
         is_inside = ((cells >= 0) & (cells < values.shape)).all(axis=-1)
-        found[first : first + _ROWS][is_inside] = values[tuple(cells[is_inside].T)]
-    return found
+        mask[first : first + _ROWS][is_inside] = values[tuple(cells[is_inside].T)]
+    return mask
 
 
 def holding_centres(grid: OccupancyGrid, marked: BoolArray, frame: Frame | None) -> BoolArray:
@@ -329,13 +329,13 @@ def holding_centres(grid: OccupancyGrid, marked: BoolArray, frame: Frame | None)
     if _is_cell_by_cell(grid, marked, frame):
         return marked
     frame = grid.frame if frame is None else frame
-    found = np.zeros(grid.shape, dtype=np.bool_)
+    holds = np.zeros(grid.shape, dtype=np.bool_)
     for first in range(0, marked.shape[0], _ROWS):
         own = np.argwhere(marked[first : first + _ROWS]) + np.array([first, 0])
         cells = grid.frame.cells_of(frame.points_of(own))
         is_inside = ((cells >= 0) & (cells < grid.shape)).all(axis=-1)
-        found[tuple(cells[is_inside].T)] = True
-    return found
+        holds[tuple(cells[is_inside].T)] = True
+    return holds
 
 
 def _is_cell_by_cell(grid: OccupancyGrid, mask: AnyArray, frame: Frame | None) -> bool:

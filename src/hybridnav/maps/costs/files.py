@@ -41,9 +41,7 @@ class CostSpec:
     kind: str
     """`clearance`, `speed` or `keepout`."""
     file: str = ""
-    """File of a mask."""
     settings: dict[str, Any] = field(default_factory=dict)
-    """Settings by name."""
 
     @property
     def pose(self) -> tuple[float, float, float]:

@@ -175,8 +175,8 @@ def _misfit(body: bytes, shape: tuple[int, int], first_line: int) -> str:
     for number, line in enumerate(lines[:rows], start=first_line):
         if len(line) != cols:
             return f", line {number}: {len(line)} characters, expected {cols} (the width)"
-    found = f"at least {len(lines)}" if len(lines) > rows else f"only {len(lines)}"
-    return f": {found} rows, expected {rows} (the height)"
+    count = f"at least {len(lines)}" if len(lines) > rows else f"only {len(lines)}"
+    return f": {count} rows, expected {rows} (the height)"
 
 
 def load_scenarios(path: PathLike, *, shape: tuple[int, int] | None = None) -> list[Scenario]:

@@ -106,13 +106,13 @@ def load_shapes(path: PathLike, *, heights_m: tuple[float, float] = (0.0, math.i
     text = read_text(path, what="world", max_bytes=MOST_BYTES, kind="SDF", **errors)
     reader = _Reader(where)
     reader.parse(text, expat.ParserCreate("utf-8"))
-    found = [
+    collisions = [
         shape for shape in _World(where, reader.root).shapes() if shape[3] > low and shape[2] < high
     ]
-    shapes = np.empty(len(found), object)
-    shapes[:] = [shape for shape, *_ in found]
-    radii = np.array([radius for _, radius, *_ in found])
-    return ShapeWorld(shapes, radii, tuple(name for *_, name in found))
+    shapes = np.empty(len(collisions), object)
+    shapes[:] = [shape for shape, *_ in collisions]
+    radii = np.array([radius for _, radius, *_ in collisions])
+    return ShapeWorld(shapes, radii, tuple(name for *_, name in collisions))
 
 
 class _Reader(XmlReader):
@@ -171,8 +171,8 @@ class _World(NamedTuple):
 
     def _check_bare(self, home: Element) -> None:
         for tag in ("include", "population", "road"):
-            for found in home.findall(tag):
-                uri = (found.findtext("uri") or "").strip()
+            for element in home.findall(tag):
+                uri = (element.findtext("uri") or "").strip()
                 if uri not in _BARE:
                     what = f"{tag} {uri}".strip()
                     raise MapError(
@@ -219,15 +219,15 @@ class _World(NamedTuple):
     def _numbers(self, element: Element, tag: str, name: str, count: int) -> list[float]:
         text = element.findtext(tag) or ""
         try:
-            found = [float(word) for word in text.split()]
+            numbers = [float(word) for word in text.split()]
         except ValueError:
-            found = []
-        if len(found) != count or not all(0 < number < math.inf for number in found):
+            numbers = []
+        if len(numbers) != count or not all(0 < number < math.inf for number in numbers):
             raise MapError(
                 f"{self.where}: {name:.80} has the {tag} {text.strip()!r:.60}, expected "
                 f"{count} metres above 0"
             )
-        return found
+        return numbers
 
     def _pose(self, element: Element, name: str) -> Pose:
         """Return the pose of an element in its parent: it must stand upright."""

@@ -229,7 +229,6 @@ class Problem:
     """float64 (3,)."""
     goal: FloatArray
     objective: Any
-    """Objective of OMPL."""
     enough: float = math.inf
     """Cost at which a planner that improves paths may stop; infinity: at the first path."""
 

@@ -91,20 +91,20 @@ def read_building_entries(path: PathLike) -> Entries:
     if not floors:
         raise MapError(f"{where}: floors is empty, expected at least one floor")
     links = values.list_of("links", _MOST_LINKS)
-    found = Entries(
+    entries = Entries(
         where,
         tuple(_floor(item, _at(marked, where, "floors", i)) for i, item in enumerate(floors)),
         tuple(_link(marked, where, item, i) for i, item in enumerate(links)),
         values.number("speed_m_s"),
         _profiles(marked, where, values.list_of("profiles", _MOST_PROFILES)),
     )
-    _check_names("floor", found.floors)
-    _check_names("link", found.links)
-    return found
+    _check_names("floor", entries.floors)
+    _check_names("link", entries.links)
+    return entries
 
 
 def _profiles(marked: Marked, where: str, items: list[Any]) -> tuple[Profile, ...]:
-    found: dict[str, Profile] = {}
+    profiles: dict[str, Profile] = {}
     keys = {one.name: one for one in fields(Profile)}
     for number, item in enumerate(items):
         at = _at(marked, where, "profiles", number)
@@ -117,13 +117,13 @@ def _profiles(marked: Marked, where: str, items: list[Any]) -> tuple[Profile, ..
                 shown = brief(values.given[key])
                 raise MapError(f"{at}: profile {name}: {key} must be true or false, got {shown}")
             given[key] = values.given[key] if is_flag else values.number(key)
-        if name in found:
+        if name in profiles:
             raise MapError(f"{at}: profile {name}: the name is given twice")
         try:
-            found[name] = Profile(name=name, **given)
+            profiles[name] = Profile(name=name, **given)
         except InvalidValueError as error:
             raise MapError(f"{at}: {error}") from None
-    return tuple(found.values())
+    return tuple(profiles.values())
 
 
 def _check_names(what: str, entries: Sequence[FloorEntry | LinkEntry]) -> None:
@@ -162,9 +162,9 @@ def _link(marked: Marked, where: str, item: Any, index: int) -> LinkEntry:
     values = _Values(item, at, _LINK_KEYS)
     name: str = values.name("name", needed=True) or ""
     kind: Any = values.given.get("kind")
-    known = get_args(LinkKind)
-    if kind not in known:
-        raise MapError(f"{at}: link {name}: kind must be {', '.join(known)}, got {brief(kind)}")
+    kinds = get_args(LinkKind)
+    if kind not in kinds:
+        raise MapError(f"{at}: link {name}: kind must be {', '.join(kinds)}, got {brief(kind)}")
     ends = values.list_of("ends", MOST_FLOORS)
     numbers = {key: values.number(key) for key in _LINK_KEYS[3:]}
     return LinkEntry(
@@ -202,14 +202,14 @@ def _end(item: Any, at: str) -> EndEntry:
 class _Values:
     """A mapping of the file, whose values are checked as they are read."""
 
-    def __init__(self, given: Any, at: str, known: tuple[str, ...]) -> None:
+    def __init__(self, given: Any, at: str, keys: tuple[str, ...]) -> None:
         if not isinstance(given, dict):
-            expected = f"expected a mapping with {', '.join(known[:3])}"
+            expected = f"expected a mapping with {', '.join(keys[:3])}"
             raise MapError(f"{at}: {expected}, got {brief(given)}")
         for key in given:
-            if key not in known:
+            if key not in keys:
                 shown = brief(key)
-                raise MapError(f"{at}: unknown key {shown}; known are {', '.join(known)}")
+                raise MapError(f"{at}: unknown key {shown}; known are {', '.join(keys)}")
         self.given, self._at = given, at
 
     def list_of(self, key: str, most: int) -> list[Any]:

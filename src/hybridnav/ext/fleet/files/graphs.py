@@ -297,9 +297,9 @@ def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
     edges: dict[int, dict[str, Any]] = {}
     for edge, passed in enumerate(graph.edge_doors):
         edges[edge] = {"metadata": edge_metadata(graph, [edge])}
-        known = [door_names[number] for number in passed if number in door_names]
-        if known:
-            edges[edge]["door_name"] = known[0]
+        names = [door_names[number] for number in passed if number in door_names]
+        if names:
+            edges[edge]["door_name"] = names[0]
     return WaypointGraph(
         name=graph.grid.name,
         format="hybridnav",

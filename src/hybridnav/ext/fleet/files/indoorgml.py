@@ -165,16 +165,16 @@ def _add_places(
         layer.add_node(cell, polygon=polygons[place], **facts)
     weights = level.through_m.round(_DECIMALS).tolist()
     for arc, (one, other) in enumerate(level.arcs.tolist()):
-        known = {
+        common = {
             "kind": "NavigableBoundary" if is_free[one] and is_free[other] else "CellBoundary",
             "line": _line_of(topology, level.boundary(arc)),
             "is_virtual": True,
         }
         boundary = f"A{number}.{int(topology.arc_ids[arc])}"
         if one == other:
-            layer.graph["boundaries"][boundary] = known | {"cells": [names[one]]}
+            layer.graph["boundaries"][boundary] = common | {"cells": [names[one]]}
         else:
-            facts = {"weight": weights[arc], "boundary": boundary} | known
+            facts = {"weight": weights[arc], "boundary": boundary} | common
             layer.add_edge(names[one], names[other], f"{boundary}.edge", **facts)
 
 
@@ -187,15 +187,15 @@ def _polygons(topology: TopologicalMap) -> list[list[Line]]:
     level = np.argwhere(fields[1:, 1:-1] != fields[:-1, 1:-1])
     ends = np.concatenate([upright + np.array([1, 0]), level + np.array([0, 1])])
     merged = _merged(np.stack([np.concatenate([upright, level]), ends], axis=1))
-    found: list[list[Line]] = [[] for _ in range(topology.n_places)]
+    polygons: list[list[Line]] = [[] for _ in range(topology.n_places)]
     areas = shapely.polygonize([merged])
     for area in shapely.orient_polygons(areas, exterior_cw=True).geoms:  # rows run along y
         row, col = (int(each) for each in area.representative_point().coords[0])
         place = int(fields[row + 1, col + 1])
         if place >= 0:
             rings = [area.exterior, *area.interiors]
-            found[place] = [_in_metres(topology, ring.simplify(0).coords) for ring in rings]
-    return found
+            polygons[place] = [_in_metres(topology, ring.simplify(0).coords) for ring in rings]
+    return polygons
 
 
 def _line_of(topology: TopologicalMap, pairs: LongArray) -> Line:
@@ -246,8 +246,8 @@ def _add_rooms(
     for label, (name, cell) in zip(labels, ids.items(), strict=True):
         own = [f"P{number}.{place}" for place in topology.place_ids[room_of == label].tolist()]
         rings = [places.nodes[place]["polygon"] for place in own]
-        known = [shapely.Polygon(outer, inner) for outer, *inner in rings]
-        area = shapely.union_all(known)
+        polygons = [shapely.Polygon(outer, inner) for outer, *inner in rings]
+        area = shapely.union_all(polygons)
         parts = sorted(getattr(area, "geoms", [area]), key=lambda part: part.area)
         split += [name] * (len(parts) > 1)
         facts = {"kind": "NavigableSpace", "name": name, "level": floor[1], "poi": False}
@@ -262,9 +262,9 @@ def _add_rooms(
 
 
 def _add_door(
-    layer: nx.MultiGraph[str], door: Door, ends: Any, known: tuple[dict[str, str], int]
+    layer: nx.MultiGraph[str], door: Door, ends: Any, floor_ids: tuple[dict[str, str], int]
 ) -> None:
-    ids, number = known
+    ids, number = floor_ids
     cells = [ids[name] for name in door.rooms if name in ids]
     boundary = f"D{number}.{door.number}"
     facts: dict[str, Any] = {
@@ -352,30 +352,30 @@ def _members(head: dict[str, Any], **members: list[dict[str, Any]]) -> str:
 
 
 def _cell(cell: str, facts: dict[str, Any], boundaries: list[str]) -> dict[str, Any]:
-    known = {"id": cell, "featureType": facts.get("kind", "CellSpace")}
-    known |= {"poi": facts.get("poi", False), "duality": f"{cell}.node"}
-    known |= {_NAMES[0]: facts["name"]} if "name" in facts else {}
-    known |= {"level": facts["level"]} if "level" in facts else {}
+    entry = {"id": cell, "featureType": facts.get("kind", "CellSpace")}
+    entry |= {"poi": facts.get("poi", False), "duality": f"{cell}.node"}
+    entry |= {_NAMES[0]: facts["name"]} if "name" in facts else {}
+    entry |= {"level": facts["level"]} if "level" in facts else {}
     if facts.get("polygon"):
         area = {"type": "Polygon", "coordinates": facts["polygon"]}
-        known["cellSpaceGeom"] = {"geometry2D": area}
-    return known | ({"boundedBy": boundaries} if boundaries else {})
+        entry["cellSpaceGeom"] = {"geometry2D": area}
+    return entry | ({"boundedBy": boundaries} if boundaries else {})
 
 
 def _node(cell: str, facts: dict[str, Any], edges: list[str]) -> dict[str, Any]:
-    known = {"id": f"{cell}.node", "featureType": "Node", "duality": cell, "connects": edges}
+    entry = {"id": f"{cell}.node", "featureType": "Node", "duality": cell, "connects": edges}
     point = {"type": "Point", "coordinates": facts.get("point")}
-    return known | ({"geometry": point} if "point" in facts else {})
+    return entry | ({"geometry": point} if "point" in facts else {})
 
 
 def _boundary(boundary: str, facts: dict[str, Any]) -> dict[str, Any]:
-    known = {"id": boundary, "featureType": facts.get("kind", "CellBoundary")}
-    known["isVirtual"] = facts.get("is_virtual", False)
-    known |= {"duality": facts["duality"]} if "duality" in facts else {}
+    entry = {"id": boundary, "featureType": facts.get("kind", "CellBoundary")}
+    entry["isVirtual"] = facts.get("is_virtual", False)
+    entry |= {"duality": facts["duality"]} if "duality" in facts else {}
     if facts.get("line"):
         line = {"type": "LineString", "coordinates": facts["line"]}
-        known["cellBoundaryGeom"] = {"geometry2D": line}
-    return known
+        entry["cellBoundaryGeom"] = {"geometry2D": line}
+    return entry
 
 
 def _connections(model: IndoorModel) -> Iterator[dict[str, Any]]:
@@ -474,17 +474,17 @@ def read_indoor_floors(text: str, where: str, name: str) -> BuildingGraph:
     for cell, facts in facts_of.items():
         floor = level_of[cell]
         gathered = floors.setdefault(floor, Gathered(f"{where}, level {shown(floor)}"))
-        known = {key: each for key, each in facts.items() if key in {"kind", "name", "poi"}}
-        gathered.add_node(cell, points.get(cell), known)
+        own = {key: each for key, each in facts.items() if key in {"kind", "name", "poi"}}
+        gathered.add_node(cell, points.get(cell), own)
     crossing: list[tuple[str, str, str]] = []
     for one, other, key, facts in layer.edges(keys=True, data=True):
         names = {facts_of[end].get("name", key) for end in (one, other)}
         if level_of[one] != level_of[other]:
             crossing.append((str(names.pop() if len(names) == 1 else key), one, other))
             continue
-        known = {"weight": facts["weight"]}
+        own = {"weight": facts["weight"]}
         gathered, is_directed = floors[level_of[one]], layer.is_directed()
-        gathered.add_link((one, other), known, directed=is_directed, name=key)
+        gathered.add_link((one, other), own, directed=is_directed, name=key)
     kept = {floor: each for floor, each in floors.items() if each.has_nodes}
     links = links_between(crossing, level_of, points, list(kept))
     graphs = tuple(
@@ -549,23 +549,23 @@ def _entries(space: dict[str, Any], key: str, where: str) -> Iterator[tuple[str,
     seen = set()
     for number, given in enumerate(list_of(space.get(key, []), where, key)):
         entry = mapping_of(given, f"{where}, {key} {number}", f"an entry of {key}")
-        known = entry.get("id")
-        if not isinstance(known, str) or known in seen:
-            raise MapError(f"{where}, {key} {number}: expected an id of its own, got {known!r:.60}")
-        seen.add(known)
-        yield known, entry
+        label = entry.get("id")
+        if not isinstance(label, str) or label in seen:
+            raise MapError(f"{where}, {key} {number}: expected an id of its own, got {label!r:.60}")
+        seen.add(label)
+        yield label, entry
 
 
-def _known(reference: Any, known: Any, where: str) -> str:
+def _known(reference: Any, ids: Any, where: str) -> str:
     """Return the id that a reference means, also behind `#` or a path of colons."""
     text = reference if isinstance(reference, str) else ""
     tried = (text, text.rpartition("#")[2], text.rpartition(":")[2])
-    found = next((each for each in tried if each in known), None)
-    if found is None:
+    meant = next((each for each in tried if each in ids), None)
+    if meant is None:
         raise MapError(
             f"{where}: {reference!r:.60} is the id of nothing here, expected one that is"
         )
-    return found
+    return meant
 
 
 def _two(references: Any, cells: dict[str, str], where: str) -> tuple[str, str]:
@@ -586,5 +586,5 @@ def _geometry(value: Any, key: str, kind: str) -> Any:
 def _points(value: Any, depth: int) -> Any:
     if depth == 0:
         return pair_of(value)
-    found = [_points(each, depth - 1) for each in value] if isinstance(value, list) else [None]
-    return None if None in found else found
+    points = [_points(each, depth - 1) for each in value] if isinstance(value, list) else [None]
+    return None if None in points else points

@@ -51,18 +51,18 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
             raise MapError(f"{where}: more than {rmf.MOST_FLOORS} levels are not read")
         stations = _stations(layout, at)
         for node in _entries(layout, "nodes", at):
-            known = _text(node, "nodeId", at)
+            node_id = _text(node, "nodeId", at)
             point = pair_of(node.get("nodePosition"))
             facts = {key: value for key, value in node.items() if key != "nodePosition"}
-            facts |= _id_in(known, f"{floor}/")
-            if known in stations:
-                facts["stations"] = stations[known]
+            facts |= _id_in(node_id, f"{floor}/")
+            if node_id in stations:
+                facts["stations"] = stations[node_id]
             if isinstance(node.get("nodeName"), str):
                 facts["name"] = node["nodeName"]
-            gathered.add_node(known, point, facts)
-            floor_of[known] = floor
+            gathered.add_node(node_id, point, facts)
+            floor_of[node_id] = floor
             if point is not None:
-                point_of[known] = point
+                point_of[node_id] = point
     crossing = _add_edges(layouts, floors, floor_of)
     kept = {floor: gathered for floor, gathered in floors.items() if gathered.has_nodes}
     if not kept:
@@ -97,13 +97,13 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
 
 def _layouts(data: dict[str, Any], where: str) -> list[tuple[str, str, dict[str, Any]]]:
     """Return each layout, after what messages about it begin with, and its floor."""
-    found = []
+    layouts = []
     for number, entry in enumerate(rmf.list_of(data.get("layouts"), where, "layouts")):
         at = f"{where}, layout {number}"
         layout = rmf.mapping_of(entry, at, "the layout")
         floor = str(layout.get("layoutLevelId", layout.get("layoutId", number)))
-        found.append((at, floor, layout))
-    return found
+        layouts.append((at, floor, layout))
+    return layouts
 
 
 def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str, Any]]:
@@ -112,12 +112,12 @@ def _entries(layout: dict[str, Any], key: str, where: str) -> Iterable[dict[str,
 
 
 def _stations(layout: dict[str, Any], where: str) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {}
+    stations: dict[str, list[str]] = {}
     for station in _entries(layout, "stations", where):
         name = str(station.get("stationName") or _text(station, "stationId", where))
         for node in rmf.list_of(station.get("interactionNodeIds"), where, "interactionNodeIds"):
-            found.setdefault(str(node), []).append(name)
-    return found
+            stations.setdefault(str(node), []).append(name)
+    return stations
 
 
 def _text(entry: dict[str, Any], key: str, where: str) -> str:
@@ -179,12 +179,12 @@ def links_between(
         for end in ends:
             if floor_of[end] in place and end in point_of:
                 stops.setdefault(name, {}).setdefault(floor_of[end], point_of[end])
-    stops = {name: found for name, found in stops.items() if len(found) > 1}
+    stops = {name: points_on for name, points_on in stops.items() if len(points_on) > 1}
     own_names = _own_names(list(stops))
     links = []
-    for name, found in stops.items():
-        ordered = sorted(found, key=place.__getitem__)
-        known = tuple(LinkEnd(floor, found[floor]) for floor in ordered)
+    for name, points_on in stops.items():
+        ordered = sorted(points_on, key=place.__getitem__)
+        known = tuple(LinkEnd(floor, points_on[floor]) for floor in ordered)
         links.append(Link(name=own_names[name], kind=_split(name)[0] or "lift", ends=known))
     return links
 
@@ -308,8 +308,8 @@ def _lif_out_layouts(building: BuildingGraph, types: list[str]) -> list[dict[str
     layouts: list[dict[str, Any]] = []
     ids = {floor.name: _floor_ids(floor) for floor in building.floors}
     for floor in building.floors:
-        known = ids[floor.name][0]
-        nodes = [_node(floor, node, known[node], types) for node in range(floor.graph.n_nodes)]
+        node_ids = ids[floor.name][0]
+        nodes = [_node(floor, node, node_ids[node], types) for node in range(floor.graph.n_nodes)]
         layouts.append(
             {
                 "layoutId": floor.name,
@@ -340,18 +340,18 @@ def _floor_ids(floor: FloorGraph) -> tuple[list[str], list[str]]:
 
 def _unique(ids: Sequence[Any]) -> Sequence[Any]:
     """Return whole numbers as they are, and free ones for others; places where two are equal."""
-    known = [each for each in ids if type(each) is int]
-    if len(set(known)) < len(known):
+    numbers = [each for each in ids if type(each) is int]
+    if len(set(numbers)) < len(numbers):
         return range(len(ids))
-    free = itertools.count(max(known, default=-1) + 1)
+    free = itertools.count(max(numbers, default=-1) + 1)
     return [each if type(each) is int else next(free) for each in ids]
 
 
-def _node(floor: FloorGraph, node: int, known: str, types: list[str]) -> dict[str, Any]:
+def _node(floor: FloorGraph, node: int, node_id: str, types: list[str]) -> dict[str, Any]:
     x, y = floor.graph.points[node].round(_DECIMALS).tolist()
     name = floor.graph.node_facts.get(node, {}).get("name")
     return {
-        "nodeId": known,
+        "nodeId": node_id,
         **({"nodeName": name} if isinstance(name, str) and name else {}),
         "mapId": floor.name,
         "nodePosition": {"x": x + 0.0, "y": y + 0.0},
@@ -366,8 +366,8 @@ def _edges(
         facts = floor.graph.edge_facts.get(edge, {})
         door = facts.get("door_name")
         ends = ids[0][tail], ids[0][head]
-        known = {"edgeDescription": f"door {door}"} if isinstance(door, str) and door else {}
-        yield ({"edgeId": ids[1][edge]} | known | _between(ends, types, speed_limit_of(facts)))
+        door_text = {"edgeDescription": f"door {door}"} if isinstance(door, str) and door else {}
+        yield ({"edgeId": ids[1][edge]} | door_text | _between(ends, types, speed_limit_of(facts)))
 
 
 def _between(nodes: tuple[str, str], types: list[str], speed: float | None) -> dict[str, Any]:

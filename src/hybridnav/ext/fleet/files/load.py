@@ -68,14 +68,14 @@ def load_graph(path: PathLike, *, floor: str | None = None) -> WaypointGraph:
     """
     suffix, where = Path(path).suffix.lower(), f"graph {printable(path)}"
     try:
-        found = _read(path, suffix, where)
-        if not isinstance(found, WaypointGraph):
-            return floors.floor_in(found, floor, where)
+        graph = _read(path, suffix, where)
+        if not isinstance(graph, WaypointGraph):
+            return floors.floor_in(graph, floor, where)
     except InvalidValueError as error:
         raise MapError(str(error)) from None
     if floor is not None:
-        raise MapError(f"{where}: a {found.format} graph has no floors: leave out {floor!r:.60}")
-    return found
+        raise MapError(f"{where}: a {graph.format} graph has no floors: leave out {floor!r:.60}")
+    return graph
 
 
 def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGraph:

@@ -86,8 +86,8 @@ def read_osm(
             f"{where}: no level has a node, expected rooms (indoor=room), areas of osmAG or ways "
             "with highway and level"
         )
-    found = {floor.level: floor.name for floor, _ in kept}
-    links = _Links(data, points, found, where)
+    level_names = {floor.level: floor.name for floor, _ in kept}
+    links = _Links(data, points, level_names, where)
     joined = tuple(links.found(floors))
     first, *others = (graph for _, graph in kept if graph is not None)
     links.findings.add_all(first.graph.findings)
@@ -116,12 +116,12 @@ def _sorted_floors(data: osm.OsmData, where: str) -> list[OsmFloor]:
             floor.describe(tags)
     if len(floors) > MOST_FLOORS:
         raise MapError(f"{where}: more than {MOST_FLOORS} levels are not read")
-    found = sorted(floors.values(), key=lambda floor: floor.level)
-    counts = Counter(floor.name for floor in found)
+    ordered = sorted(floors.values(), key=lambda floor: floor.level)
+    counts = Counter(floor.name for floor in ordered)
     if max(counts.values(), default=1) > 1:
-        for floor in found:
+        for floor in ordered:
             floor.name = f"{floor.level:g}"
-    return found
+    return ordered
 
 
 def _floor(
@@ -187,14 +187,14 @@ def _is_room(element: osm.OsmWay) -> bool:
 def _areas(
     rooms: list[osm.OsmWay], names: dict[int, str], points: dict[int, Point | None]
 ) -> list[FloorArea]:
-    found = []
+    areas = []
     for way in rooms:
         corners = [points.get(node) for node in way.refs[:-1]]
         if None not in corners and len(set(corners)) > 2:  # noqa: PLR2004
             is_corridor = "corridor" in {way.tags.get("osmAG:areaType"), way.tags.get("indoor")}
             outline = np.array(corners, dtype=np.float64)
-            found.append(FloorArea(names[way.id], "corridor" if is_corridor else "room", outline))
-    return found
+            areas.append(FloorArea(names[way.id], "corridor" if is_corridor else "room", outline))
+    return areas
 
 
 def _doors(
@@ -202,7 +202,7 @@ def _doors(
 ) -> list[DoorLine]:
     """Return the passages between two areas of a level."""
     by_name = {name: way for way, name in names.items()}
-    found = []
+    doors = []
     for way in floor.passages:
         sides = [_area(way.tags.get(key), names, by_name) for key in ("osmAG:from", "osmAG:to")]
         rooms = [names[side] for side in sides if side is not None]
@@ -211,8 +211,8 @@ def _doors(
             continue
         name = way.tags.get("name", f"way {way.id}")
         is_opening = name not in data.door_names
-        found.append(DoorLine(name, (ends[0], ends[1]), (rooms[0], rooms[1]), is_opening))
-    return found
+        doors.append(DoorLine(name, (ends[0], ends[1]), (rooms[0], rooms[1]), is_opening))
+    return doors
 
 
 class _Links:
@@ -287,9 +287,9 @@ class _Links:
         incline.
         """
         levels = osm.levels_of(line.tags)
-        known = [(node, at) for node in line.refs if (at := self._points.get(node)) is not None]
+        placed = [(node, at) for node in line.refs if (at := self._points.get(node)) is not None]
         stops: dict[float, Point] = {}
-        for node, at in known:
+        for node, at in placed:
             own = osm.levels_of(self._data.tags.get(node, {}))
             passed = self._levels_at.get(node, set()).intersection(levels)
             for level in own if len(own) == 1 else passed:
@@ -299,8 +299,8 @@ class _Links:
             shape = _shape(line, self._points) if lost else None
             middle = None if shape is None else shape.representative_point()
             stops |= {} if middle is None else dict.fromkeys(lost, (middle.x, middle.y))
-        elif lost and len(levels) == 2 and len(known) > 1:  # noqa: PLR2004
-            ends = [at for _, at in (known[0], known[-1])]
+        elif lost and len(levels) == 2 and len(placed) > 1:  # noqa: PLR2004
+            ends = [at for _, at in (placed[0], placed[-1])]
             incline = line.tags.get("incline", "")
             if len(lost) == 1:
                 stops[lost[0]] = max(ends, key=lambda at: dist(at, *stops.values()))
@@ -355,8 +355,8 @@ class _Links:
         own = free_name(itertools.chain([name] if name else [], numbered), self._taken)
         check_link_count(len(self._taken), self._where)
         given = {key: number_of(tags.get(f"hybridnav:{key}")) for key in _FACTS}
-        known = {key: value for key, value in given.items() if value > 0}
-        return Link(name=own, kind=kind, ends=tuple(ends.values()), **known)
+        figures = {key: value for key, value in given.items() if value > 0}
+        return Link(name=own, kind=kind, ends=tuple(ends.values()), **figures)
 
 
 # The graph of rooms and doors that have no ways between them.
@@ -433,11 +433,11 @@ def _shape(ring: osm.OsmWay, points: Mapping[int, Point | None]) -> BaseGeometry
     return shapely.make_valid(shapely.Polygon(corners))
 
 
-def _middle(found: list[Point | None]) -> Point | None:
-    known = [end for end in found if end is not None]
-    if not known:
+def _middle(ends: list[Point | None]) -> Point | None:
+    there = [end for end in ends if end is not None]
+    if not there:
         return None
-    return sum(x for x, _ in known) / len(known), sum(y for _, y in known) / len(known)
+    return sum(x for x, _ in there) / len(there), sum(y for _, y in there) / len(there)
 
 
 def _add_doors(
@@ -459,9 +459,9 @@ def _add_doors(
             inside[way.id].append((f"node {node}", point))
 
 
-def _area(value: str | None, known: Mapping[int, object], by_name: Mapping[str, int]) -> int | None:
+def _area(value: str | None, areas: Mapping[int, object], by_name: Mapping[str, int]) -> int | None:
     """Return the area that a passage names, by its id or by its name."""
     number = number_of(value)
-    if number in known:
+    if number in areas:
         return int(number)
     return by_name.get(value) if value else None

@@ -160,8 +160,8 @@ class _Writer:
     def _node_tags(self, floor: FloorGraph, node: int) -> Tags:
         name = floor.graph.node_facts.get(node, {}).get("name")
         tags = self._on(floor) | ({"name": name} if isinstance(name, str) and name else {})
-        known = floor.graph.ids[0][node]
-        tags |= {ID: str(known)} if type(known) is int else {}
+        own_id = floor.graph.ids[0][node]
+        tags |= {ID: str(own_id)} if type(own_id) is int else {}
         return tags | ({} if node in self._joined[floor.name] else {ALONE: "yes"})
 
     def _areas(self, floor: FloorGraph, shapes: Shapes) -> dict[str, int]:
@@ -187,10 +187,10 @@ class _Writer:
                 (x, y), (u, v) = door.ends
                 tags = {"door": "yes", "name": door.name} | self._on(floor)
                 self._node(((x + u) / 2, (y + v) / 2), tags)
-            known = [way_of[room] for room in door.rooms if room in way_of]
-            if len(known) == 2:  # noqa: PLR2004 - both sides
+            sides = [way_of[room] for room in door.rooms if room in way_of]
+            if len(sides) == 2:  # noqa: PLR2004 - both sides
                 refs = [shapes.corners.get(end) or self._node(end, {}) for end in door.ends]
-                self._passage(refs, door.name, (known[0], known[1]), self._raised(floor))
+                self._passage(refs, door.name, (sides[0], sides[1]), self._raised(floor))
 
     def _passage(self, refs: list[int], name: str, joined: tuple[int, int], tags: Tags) -> None:
         sides = {"osmAG:from": f"-{joined[0]}", "osmAG:to": f"-{joined[1]}"}
@@ -202,16 +202,16 @@ class _Writer:
         waiting: dict[tuple[int, int, str, float | None], list[int]] = {}
         for edge, (tail, head) in enumerate(graph.edges.tolist()):
             door, speed = _facts_of(floor, edge)
-            known = ids[edge]
+            own_id = ids[edge]
             back = waiting.get((head, tail, door, speed))
             if back:
                 way_tags = self._ways[back.pop() - 1][1]
                 del way_tags["oneway"]
-                way_tags |= {ID_BACK: str(known)} if type(known) is int else {}
+                way_tags |= {ID_BACK: str(own_id)} if type(own_id) is int else {}
                 continue
             tags = {"highway": "footway", "indoor": "yes", "oneway": "yes"} | self._on(floor)
             tags |= {"hybridnav:door": door} if door else {}
-            tags |= {ID: str(known)} if type(known) is int else {}
+            tags |= {ID: str(own_id)} if type(own_id) is int else {}
             tags |= {} if speed is None else {"maxspeed": f"{speed * _KM_H:.6g}"}
             way = self._add_way([refs[tail], refs[head]], tags)
             waiting.setdefault((tail, head, door, speed), []).append(way)
@@ -331,9 +331,7 @@ class Shapes:
     def __init__(self, floor: FloorGraph) -> None:
         self._names = [area.name for area in floor.areas]
         self._polygons = [shapely.Polygon(area.outline) for area in floor.areas]
-        self.rings = [
-            _counter_clockwise([(x, y) for x, y in a.outline.tolist()]) for a in floor.areas
-        ]
+        self.rings = [_counter_clockwise(_pairs(area.outline)) for area in floor.areas]
         self.corners: dict[Point, int] = {}
         """Node of each corner, filled by the writer."""
         place = {name: at for at, name in reversed(list(enumerate(self._names)))}

@@ -229,17 +229,17 @@ def levels_of(tags: Tags) -> list[float]:
     As on the pages of the keys `level` and `repeat_on` in OpenStreetMap's wiki: what repeats lies
     at the same point of each.
     """
-    found: set[float] = set()
+    levels: set[float] = set()
     for part in f"{tags.get('level', '')};{tags.get('repeat_on', '')}".split(";"):
         ends = _RANGE.fullmatch(part.strip())
         if ends:
             low, high = int(ends[1]), int(ends[2])
-            found.update(range(low, min(high, low + _MOST_LEVELS) + 1))
+            levels.update(range(low, min(high, low + _MOST_LEVELS) + 1))
         else:
-            found.add(number_of(part))
-        if len(found) > _MOST_LEVELS:
+            levels.add(number_of(part))
+        if len(levels) > _MOST_LEVELS:
             break
-    return sorted(level for level in found if not math.isnan(level))
+    return sorted(level for level in levels if not math.isnan(level))
 
 
 def is_door(tags: Tags) -> bool:

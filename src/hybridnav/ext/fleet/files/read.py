@@ -231,9 +231,9 @@ def _end(entry: EndEntry, floors: dict[str, Floor], max_radius_m: float) -> Link
 def _check_in_room(point: tuple[float, float], room: str, floor: Floor) -> None:
     rooms = floor.planner.topology.rooms
     rooms.labels.index(room)
-    found = rooms.at(point)
-    if found != room:
-        where = "in no room" if found is None else f"in room {found}"
+    own = rooms.at(point)
+    if own != room:
+        where = "in no room" if own is None else f"in room {own}"
         raise MapError(f"the point {list(point)} lies {where}, expected {room}")
 
 

@@ -74,7 +74,7 @@ def read_drawn(
         ).items()
         for at in [f"{where}, lift {shown(lift)}"]
     }
-    found = {lift: rmf.RmfLift(cabin.dims_m) for lift, cabin in lifts.items()}
+    built = {lift: rmf.RmfLift(cabin.dims_m) for lift, cabin in lifts.items()}
     taken: set[rmf.Name] = set()
     floors = []
     for level, content in contents.items():
@@ -85,14 +85,14 @@ def read_drawn(
             inside = (point for point in floor.points if cabin.holds(level, point))
             end = next(inside, None)
             if end is not None:
-                found[lift].ends[level] = end
+                built[lift].ends[level] = end
         floors.append(floor)
     floors.sort(key=lambda floor: floor.elevation_m or 0.0)
     for lift, cabin in lifts.items():
-        if len(found[lift].ends) > 1:  # else the whole lift is a finding
-            _find_lost_stops(floors, f"lift {shown(lift)}", cabin.levels - found[lift].ends.keys())
+        if len(built[lift].ends) > 1:  # else the whole lift is a finding
+            _find_lost_stops(floors, f"lift {shown(lift)}", cabin.levels - built[lift].ends.keys())
     title = str(data.get("building_name") or data.get("name") or name)
-    return rmf.building_of(floors, found, title, where)
+    return rmf.building_of(floors, built, title, where)
 
 
 def _find_lost_stops(floors: list[rmf.RmfFloor], lift: str, levels: set[str]) -> None:
@@ -111,12 +111,12 @@ def _find_lost_stops(floors: list[rmf.RmfFloor], lift: str, levels: set[str]) ->
 
 def _graph_index(contents: dict[str, Any], where: str, wanted: int | None) -> int:
     used = {_index_of(lane) for content in contents.values() for lane in _lanes(content)}
-    known = sorted(index for index in used if 0 <= index < _MOST_GRAPHS)
-    if wanted is None and known:
-        return known[0]
-    if wanted in known:
+    indices = sorted(index for index in used if 0 <= index < _MOST_GRAPHS)
+    if wanted is None and indices:
+        return indices[0]
+    if wanted in indices:
         return int(wanted or 0)
-    text = ", ".join(map(str, known)) or "none"
+    text = ", ".join(map(str, indices)) or "none"
     raise MapError(f"{where}: no lane of graph {wanted or 0}; graphs with lanes: {text}")
 
 
@@ -168,8 +168,8 @@ def _fill(
     ends_of = [[numbers.get(end, -1 - end) for end in ends] for ends, _ in chosen]
     passed = _doors_passed([[_point_at(floor, end) for end in ends] for ends in ends_of], floor)
     for (tail, head), door, (_, facts) in zip(ends_of, passed, chosen, strict=True):
-        known = {key: value for key, value in facts.items() if key not in _IN_FILE_ONLY and value}
-        _add_lanes(floor, (tail, head), known | ({"door_name": door} if door else {}), facts)
+        own = {key: value for key, value in facts.items() if key not in _IN_FILE_ONLY and value}
+        _add_lanes(floor, (tail, head), own | ({"door_name": door} if door else {}), facts)
 
 
 def _point_at(floor: rmf.RmfFloor, number: int) -> rmf.Point | None:
@@ -192,16 +192,16 @@ def _parameters(entry: list[Any], at: int, where: str) -> dict[str, Any]:
 
 
 def _add_lanes(
-    floor: rmf.RmfFloor, vertices: tuple[int, int], known: dict[str, Any], facts: dict[str, Any]
+    floor: rmf.RmfFloor, vertices: tuple[int, int], common: dict[str, Any], facts: dict[str, Any]
 ) -> None:
     """Add a lane, and the one back if it leads in both directions."""
     tail, head = vertices
     way = facts.get("orientation")
     ahead = {"orientation_constraint": way} if way in _OPPOSITE else {}
-    floor.add_lane((tail, head), known | ahead)
+    floor.add_lane((tail, head), common | ahead)
     if facts.get("bidirectional") is True:
         back = {"orientation_constraint": _OPPOSITE[way]} if way in _OPPOSITE else {}
-        floor.add_lane((head, tail), known | back)
+        floor.add_lane((head, tail), common | back)
 
 
 def _door(entry: Any, vertices: list[Any], drawing: Drawing, where: str) -> DoorLine:
@@ -258,8 +258,8 @@ def _doors_passed(lanes: list[list[rmf.Point | None]], floor: rmf.RmfFloor) -> l
         )
     doors = shapely.linestrings([door.ends for door in floor.doors])
     segments = shapely.linestrings([whole[at] for at in kept])
-    found = shapely.STRtree(doors).query(segments, predicate="intersects")
-    for lane, door in sorted(found.T.tolist()):
+    crossings = shapely.STRtree(doors).query(segments, predicate="intersects")
+    for lane, door in sorted(crossings.T.tolist()):
         (a, b), (c, d) = whole[kept[lane]], floor.doors[door].ends
         along, across = np.subtract(b, a), np.subtract(d, c)
         if along[0] * across[1] != along[1] * across[0]:  # they are not parallel
@@ -382,13 +382,13 @@ def _measured(content: dict[str, Any], where: str) -> Drawing:
 
 def _fiducials(content: dict[str, Any], where: str) -> dict[str, complex]:
     """Return fiducials by name, with y up."""
-    found = {}
+    places = {}
     for number, entry in enumerate(rmf.list_of(content.get("fiducials"), where, "fiducials")):
         point = pair_of(entry)
         if point is None or len(entry) < 3:  # noqa: PLR2004
             raise MapError(f"{where}, fiducial {number}: expected [x, y, name], got {entry!r:.60}")
-        found[str(entry[2])] = complex(point[0], -point[1])
-    return found
+        places[str(entry[2])] = complex(point[0], -point[1])
+    return places
 
 
 def _fitted(

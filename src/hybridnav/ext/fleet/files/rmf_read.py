@@ -93,15 +93,15 @@ def building_of(
         raise MapError(f"{where}: no level has a vertex, expected vertices [x, y, ...]")
     place = {floor.name: at for at, floor in enumerate(kept)}
     links = []
-    for lift, known in lifts.items():
-        stops = sorted((place[floor], floor) for floor in known.ends if floor in place)
+    for lift, rmf_lift in lifts.items():
+        stops = sorted((place[floor], floor) for floor in rmf_lift.ends if floor in place)
         if len(stops) > 1:
-            ends = tuple(LinkEnd(floor, known.ends[floor]) for _, floor in stops)
-            fits = {} if known.dims_m is None else {"max_radius_m": min(known.dims_m) / 2}
+            ends = tuple(LinkEnd(floor, rmf_lift.ends[floor]) for _, floor in stops)
+            fits = {} if rmf_lift.dims_m is None else {"max_radius_m": min(rmf_lift.dims_m) / 2}
             links.append(Link(name=lift, kind="lift", ends=ends, **fits))
         else:
             at = f"lift {shown(lift)}, vertices in its cabin on {len(stops)} levels"
-            kept[0].gathered.findings.add("link-unread", at, *known.ends.values())
+            kept[0].gathered.findings.add("link-unread", at, *rmf_lift.ends.values())
     check_link_count(len(links), where)
     graphs = tuple(floor.graph(f"{name} {floor.name}") for floor in kept)
     return BuildingGraph(name=name, floors=graphs, links=tuple(links))
@@ -205,11 +205,11 @@ def read_rmf(data: dict[str, Any], where: str, name: str) -> BuildingGraph:
     by_name = {floor.name: floor for floor in floors}
     for door, facts in mapping_of(data.get("doors"), where, "doors").items():
         at = f"{where}, door {shown(door)}"
-        known = mapping_of(facts, at, "the door")
-        on = by_name.get(str(known.get("map")))
+        entry = mapping_of(facts, at, "the door")
+        on = by_name.get(str(entry.get("map")))
         if on is None:
-            raise MapError(f"{at}: it is on level {known.get('map')!r:.60}, which is not there")
-        on.doors.append(DoorLine(door, points_of(known.get("endpoints"), at)))
+            raise MapError(f"{at}: it is on level {entry.get('map')!r:.60}, which is not there")
+        on.doors.append(DoorLine(door, points_of(entry.get("endpoints"), at)))
     return building_of(floors, lifts, str(data.get("building_name") or name), where)
 
 

@@ -174,14 +174,14 @@ class _Writer:
             yield f"[{tail}, {head}, {_mapping(options)}]"
 
     def _door_lines(self) -> Iterator[str]:
-        known = [
+        doors = [
             (floor.name, door)
             for floor in self._building.floors
             for door in floor.doors
             if door.name in self._doors
         ]
-        yield "doors:" if known else "doors: {}"
-        for floor, door in known:
+        yield "doors:" if doors else "doors: {}"
+        for floor, door in doors:
             ends = ", ".join(f"[{_number(x)}, {_number(y)}]" for x, y in door.ends)
             yield f"  {quoted(door.name)}: {{endpoints: [{ends}], map: {quoted(floor)}}}"
 
@@ -196,9 +196,9 @@ class _Writer:
             yield f"  {quoted(link.name)}: {{position: [{x}, {y}, 0.0], dims: [{dims}]}}"
 
 
-def _id_option(known: Any) -> dict[str, str]:
+def _id_option(own_id: Any) -> dict[str, str]:
     """Return the id of a vertex or lane, which Open-RMF does not read and updates keep."""
-    return {"id": str(known)} if type(known) is int else {}
+    return {"id": str(own_id)} if type(own_id) is int else {}
 
 
 def speed_limit_of(facts: dict[str, Any]) -> float | None:
@@ -237,14 +237,14 @@ def _unique_names(floors: Iterable[FloorGraph]) -> dict[tuple[str, int], str]:
     ]
     counts = Counter(name for _, name in wanted)
     once = {name for name, count in counts.items() if count == 1}
-    taken, found = set(once), {}
+    taken, unique = set(once), {}
     for key, name in wanted:
         if name in once:
-            found[key] = name
+            unique[key] = name
             continue
         numbered = (f"{key[0]} {name} ({number})" for number in itertools.count(2))
-        found[key] = free_name(itertools.chain([f"{key[0]} {name}"], numbered), taken)
-    return found
+        unique[key] = free_name(itertools.chain([f"{key[0]} {name}"], numbered), taken)
+    return unique
 
 
 def _positions(link: Link) -> list[tuple[float, float]]:

@@ -68,7 +68,6 @@ class Exploration:
     grid: OccupancyGrid
     """The map that the robot made."""
     topology: TopologicalMap
-    """Its places."""
     points: FloatArray = field(repr=False)
     """float64 (n, 2), where the robot took scans, in metres."""
     driven_m: float

@@ -88,21 +88,21 @@ class Bag:
         `topic`: name of the topic; None for the only one. Raises `MapError` when there is none,
         more than one and none was named, or the file is damaged.
         """
-        found = self.topics_of({msgtype})
+        topics = self.topics_of({msgtype})
         short = msgtype.replace("/msg/", "/")
-        if topic is None and len(found) == 1:
-            return found[0]
-        if topic in found:
+        if topic is None and len(topics) == 1:
+            return topics[0]
+        if topic in topics:
             return str(topic)
         named = "a topic" if topic is None else f"topic {brief(topic)}"
-        if not found:
+        if not topics:
             there = ", ".join(sorted(self.topics)) or "none"
             raise MapError(
                 f"{self.where}: expected {named} of {short}, got no topic of that type; topics: "
                 f"{there:.200}"
             )
         raise MapError(
-            f"{self.where}: expected {named} of {short}, got {', '.join(found):.200}: name one"
+            f"{self.where}: expected {named} of {short}, got {', '.join(topics):.200}: name one"
         )
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[str, Any]]:
@@ -124,12 +124,12 @@ class Bag:
         """
         with self._open() as reader:
             wanted = [each for each in reader.connections if each.topic == topic]
-            found = None
+            newest = None
             for connection, _, raw in reader.messages(wanted):
-                found = connection, raw
-            if found is None:
+                newest = connection, raw
+            if newest is None:
                 raise MapError(f"{self.where}: topic {topic} has no message")
-            return reader.deserialize(found[1], found[0].msgtype)
+            return reader.deserialize(newest[1], newest[0].msgtype)
 
     @contextmanager
     def _open(self) -> Iterator[AnyReader]:
@@ -239,11 +239,11 @@ class _BoundedFile:
         self._file, self._most, self._left = file, most_bytes, most_bytes
 
     def read(self, size: int) -> bytes:
-        found: bytes = self._file.read(size)
-        self._left -= len(found)
+        chunk: bytes = self._file.read(size)
+        self._left -= len(chunk)
         if self._left < 0:
             raise TooLargeError("a file of the bag", self._most)
-        return found
+        return chunk
 
 
 @cache
@@ -329,17 +329,17 @@ class Transforms:
 
         Raises `NoPoseError` when they form a circle.
         """
-        found = [frame]
-        while (series := self._series.get(found[-1])) is not None:
-            if series.parent in found:
+        chain = [frame]
+        while (series := self._series.get(chain[-1])) is not None:
+            if series.parent in chain:
                 raise NoPoseError("frames in a circle")
-            found.append(series.parent)
-        return found
+            chain.append(series.parent)
+        return chain
 
     def has_motion(self, frames: Iterable[str]) -> bool:
         """Return whether the transform of one of some frames changes with time."""
-        known = (self._series[frame] for frame in frames if frame in self._series)
-        return any(not series.is_static for series in known)
+        series_of = (self._series[frame] for frame in frames if frame in self._series)
+        return any(not series.is_static for series in series_of)
 
     def pose(self, frame: str, fixed: str, stamp_ns: int) -> tuple[FloatArray, FloatArray]:
         """Return the rotation and the place of a frame in one of its ancestors.

@@ -191,13 +191,13 @@ class BagLog(ScanLog):
         for done in count(1):
             self.bytes_read = self.size_bytes * min(done, self._count) // max(self._count, 1)
             try:
-                found = next(messages, None)
+                following = next(messages, None)
             except MapError:
                 yield "rest of the bag damaged"
                 break
-            if found is None:
+            if following is None:
                 break
-            message = found[1]
+            message = following[1]
             try:
                 fixed = fixed or _fixed_frame(
                     transforms, bag_files.frame_of(message, "header.frame_id")
@@ -209,27 +209,27 @@ class BagLog(ScanLog):
 
     def _transforms(self) -> bag_files.Transforms:
         """Return the transforms of the bag; what is damaged in it ends them."""
-        found, is_whole = _transforms_of(self._bag)
+        transforms, is_whole = _transforms_of(self._bag)
         if not is_whole:
             self.notes.append("transforms of a damaged bag")
-        return found
+        return transforms
 
 
 def _transforms_of(bag: bag_files.Bag) -> tuple[bag_files.Transforms, bool]:
     """Return the transforms of a bag, and whether it is whole: what is damaged in it ends them."""
     of_odometry = bag.topics_of({bag_files.ODOMETRY})
     of_frames = bag.topics_of(bag_files.TRANSFORMS)
-    found, odometry, is_whole = bag_files.Transforms(), bag_files.Transforms(), True
+    transforms, odometry, is_whole = bag_files.Transforms(), bag_files.Transforms(), True
     try:
         for topic, message in bag.messages([*of_odometry, *of_frames]):
             if topic in of_odometry:
                 odometry.add_odometry(message)
             else:
-                found.add_message(message, is_static=topic.endswith("tf_static"))
+                transforms.add_message(message, is_static=topic.endswith("tf_static"))
     except MapError:
         is_whole = False
-    found.join(odometry)
-    return found, is_whole
+    transforms.join(odometry)
+    return transforms, is_whole
 
 
 def _fixed_frame(transforms: bag_files.Transforms, frame: str) -> str:
@@ -287,8 +287,8 @@ def bag_paths(
     """
     bag, wanted = bag_files.Bag(path), frame or "map"
     of_paths = bag.topics_of({bag_files.PATH})
-    known = [topic] if topic is not None else of_paths or bag.topics_of(bag_files.POSES)
-    kind = bag.topics.get(known[0], ("", 0))[0] if len(known) == 1 else ""
+    topics = [topic] if topic is not None else of_paths or bag.topics_of(bag_files.POSES)
+    kind = bag.topics.get(topics[0], ("", 0))[0] if len(topics) == 1 else ""
     if kind != bag_files.PATH and kind not in bag_files.POSES:
         there = [*of_paths, *bag.topics_of(bag_files.POSES)]
         raise MapError(
@@ -299,7 +299,7 @@ def bag_paths(
     transforms: bag_files.Transforms | None = None
     rows: list[tuple[float, float, float]] = []
     number = 0
-    for _, message in bag.messages(known):
+    for _, message in bag.messages(topics):
         poses = [message] if kind in bag_files.POSES else value_of(message, "poses", "path")
         if kind == bag_files.PATH:
             rows = []
@@ -313,16 +313,17 @@ def bag_paths(
                     rotation, place = transforms.pose(own, wanted, stamp_ns)
                 except bag_files.NoPoseError as why:
                     raise MapError(
-                        f"{bag.where}: {known[0]} is in frame {own!r:.60}, expected {wanted!r:.60} "
-                        f"({why}): state --frame {own:.40} if it is the frame of the map"
+                        f"{bag.where}: {topics[0]} is in frame {own!r:.60}, expected "
+                        f"{wanted!r:.60} ({why}): state --frame {own:.40} if it is the frame of "
+                        "the map"
                     ) from None
                 x, y, _ = ((rotation * (x, y, z)).sum(axis=1) + place).tolist()
             rows.append((x, y, stamp_ns / _SECOND_NS))
         if kind == bag_files.PATH and rows:
             number += 1
-            yield f"{known[0]} {number}", *_timed(rows)
+            yield f"{topics[0]} {number}", *_timed(rows)
     if kind in bag_files.POSES and rows:
-        yield known[0], *_timed(rows)
+        yield topics[0], *_timed(rows)
 
 
 def _timed(rows: list[tuple[float, float, float]]) -> tuple[FloatArray, FloatArray | None]:
