@@ -13,12 +13,7 @@ from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError, answer, progress_bar, stage, timings
 from hybridnav.cli.map_options import FloorOptions
 from hybridnav.cli.options import OneMap, OutOption, RoomsOption, option
-from hybridnav.cli.reading import (
-    check_model,
-    check_room_to_be,
-    grow_topology,
-    overridden,
-)
+from hybridnav.cli.reading import check_model, check_room_to_be, grow_topology, overridden
 from hybridnav.cli.warm import rehearse
 
 FindRoomsOption = Annotated[bool, option("--find-rooms", "Find rooms, and keep them in the model.")]

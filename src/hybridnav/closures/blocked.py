@@ -15,14 +15,7 @@ from hybridnav._base.rows import in_runs
 from hybridnav._base.typing import LongArray
 from hybridnav.closures.areas import cells_on_boundaries, checked_area, runs_near, runs_of, shown
 from hybridnav.closures.ids import arc_on, door_on, found_ids
-from hybridnav.closures.one_way import (
-    OneWay,
-    OneWayLike,
-    as_one_way,
-    checked_named,
-    joined,
-    joined_named,
-)
+from hybridnav.closures.one_way import OneWay, OneWayLike, as_one_way, checked_named, joined, union
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import OccupancyGrid
 from hybridnav.pyramid import LevelArc
@@ -127,7 +120,7 @@ class Blocked:
             if one.name not in {"cells", "named", "one_way"}
         }
         cells = np.concatenate([np.asarray(self.cells), np.asarray(other.cells)])
-        named = joined_named(self.named, other.named)
+        named = union(self.named, other.named)
         one_way = joined([self.one_way, other.one_way])
         return Blocked(**both, cells=cells, named=named, one_way=one_way)
 

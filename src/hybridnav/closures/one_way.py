@@ -113,7 +113,7 @@ class OneWay:
             for name in ("lines", "doors", "arcs")
         }
         sides = np.concatenate([np.asarray(self.sides), np.asarray(other.sides)])
-        return OneWay(**both, sides=sides, named=joined_named(self.named, other.named))
+        return OneWay(**both, sides=sides, named=union(self.named, other.named))
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -381,7 +381,7 @@ def checked_named(named: Any, kind: type[_T]) -> dict[str, _T]:
     return dict(named)
 
 
-def joined_named(first: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
+def union(first: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
     """Return the closures of two mappings, those of one name joined."""
     both = {name: each | other[name] for name, each in first.items() if name in other}
     return {**first, **other, **both}

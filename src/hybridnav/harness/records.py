@@ -6,9 +6,11 @@ import os
 import platform
 import re
 from collections import Counter
+from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
+from types import TracebackType
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -18,21 +20,15 @@ import hybridnav
 from hybridnav._base.moves import STEPS
 from hybridnav._base.typing import LongArray
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.names import BASELINES, REFERENCE
-from hybridnav.harness.yardstick import Fault, contradiction
+from hybridnav.harness.names import BASELINES, REFERENCE, MethodSpec
+from hybridnav.harness.scenes import Pair
+from hybridnav.harness.yardstick import Fault, Kind, contradiction
 from hybridnav.maps.cells import MAX_CELLS
 
 try:
     import fcntl
 except ImportError:  # not a POSIX system: no lock there
     fcntl = None  # type: ignore[assignment]
-
-from collections.abc import Iterable
-from types import TracebackType
-
-from hybridnav.harness.names import MethodSpec
-from hybridnav.harness.scenes import Pair
-from hybridnav.harness.yardstick import Kind
 
 Record = dict[str, Any]
 QueryKey = tuple[str, tuple[int, ...], tuple[int, ...]]

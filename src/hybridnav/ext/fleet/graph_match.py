@@ -14,10 +14,8 @@ from hybridnav.ext.fleet.building import Building
 from hybridnav.ext.fleet.floors import Floor
 from hybridnav.ext.fleet.link_nodes import BuildingGraph, FloorGraph, Point, join_links
 from hybridnav.ext.fleet.links import Link
+from hybridnav.graphs import Excess, Finding, GraphCheck
 from hybridnav.graphs.attach import placed_points
-from hybridnav.graphs.check import GraphCheck
-from hybridnav.graphs.gather import Finding
-from hybridnav.graphs.judge import Excess
 from hybridnav.maps.checks import checked_type
 
 AT_LINK_M = 1.0

@@ -11,15 +11,7 @@ import numpy as np
 from hybridnav._base.clock import clock
 from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.ext.fleet.floors import ROUNDED, Floor, FloorTable
-from hybridnav.ext.fleet.links import (
-    GOAL,
-    START,
-    ChosenParts,
-    Endpoint,
-    LinkNetwork,
-    Part,
-    Ride,
-)
+from hybridnav.ext.fleet.links import GOAL, START, ChosenParts, Endpoint, LinkNetwork, Part, Ride
 from hybridnav.ext.fleet.plan import COUNTS, BuildingPlan, GuidedRoute, cost_of
 from hybridnav.guide.words.itinerary import guide_of, waypoint_text
 from hybridnav.planning import HybridPlanner, PlanResult, PlanStats, PlanStatus
