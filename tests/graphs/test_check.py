@@ -24,7 +24,6 @@ SOUND = hn.graphs.build_lane_graph(HERE)
 
 @pytest.fixture
 def features(tmp_path):
-    """The features of a sound graph's file."""
     hn.graphs.export_nav2(SOUND, tmp_path / "sound.geojson")
     return json.loads((tmp_path / "sound.geojson").read_text())["features"]
 

@@ -33,7 +33,6 @@ class Cheapest(GridAstar):
         return self.changed(answer, answer.by_costs)
 
     def changed(self, answer: MethodResult, claim: CostClaim) -> MethodResult:  # noqa: ARG002
-        """Return the answer with the planted fault."""
         return answer
 
     def cost_m(self, cells: Any) -> float:
@@ -52,7 +51,6 @@ class DearSaidOptimal(Cheapest):
         return replace(answer, cells=cells, by_costs=self.claimed(claim, self.cost_m(cells)))
 
     def claimed(self, claim: CostClaim, cost_m: float) -> CostClaim:
-        """Return what is claimed of the dearer path."""
         return replace(claim, cost_m=cost_m, lower_bound_m=cost_m)
 
 

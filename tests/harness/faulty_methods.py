@@ -199,7 +199,6 @@ class PlansAlone(SoundPlaces):
         return MethodResult(None, nodes=nodes)
 
     def route(self, nodes: tuple[int, ...] | None) -> tuple[int, ...] | None:
-        """Return the regions of the answer."""
         return nodes
 
 
@@ -290,7 +289,6 @@ class SoundLine(Sound):
         return MethodResult(None, any_angle=self.line(points))
 
     def line(self, points: NDArray[np.float64]) -> AnyAngleResult:
-        """Return the path with its claims."""
         return AnyAngleResult(points, length_of(points), lower_bound_m=length_of(points[[0, -1]]))
 
 

@@ -48,7 +48,6 @@ def write_map(folder, lines, name="rooms"):
 
 
 def free_pairs(classes, count, seed):
-    """Some pairs of free cells of a map, none of a map without."""
     cells = np.argwhere(classes == CellClass.FREE)
     if not len(cells):
         return []

@@ -304,7 +304,6 @@ class Held(GridAstar):
     is_held = True
 
     def close(self):
-        """Let go of it."""
         self.is_held = False
 
 

@@ -21,7 +21,6 @@ class Boastful(ByCells):
     """Proves that its detours are shortest."""
 
     def find(self, query: Query) -> Found:
-        """Go to and fro first."""
         found: Found = super().find(query)
         if not found.has_path:
             return found
@@ -48,7 +47,6 @@ class Unsure(ByCells):
     """Finds nothing, and proves nothing."""
 
     def find(self, query: Query) -> Found:
-        """Return no path and no proof."""
         return Found(None, lower_bound_m=query.straight_m)
 
 
@@ -134,7 +132,6 @@ class ProvingAnother(Proving):
     """Proves the answer to another query."""
 
     def proof(self, result: hn.PlanResult) -> dict[str, Any]:
-        """Return the proof of the way back."""
         assert result.start is not None
         assert result.goal is not None
         return hn.prove(self.planner.plan(result.goal, result.start))

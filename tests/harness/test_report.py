@@ -52,7 +52,6 @@ class Page(HTMLParser):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
-        """Tags close in order."""
         assert self.open.pop() == tag
 
     def handle_data(self, data):
@@ -130,7 +129,6 @@ def wrong_report(*faults, checks):
 
 
 def drawings(page):
-    """The charts of a page, each parsed."""
     kind = "data:image/svg+xml,"
     uris = [image["src"] for image in page.all("img")]
     texts = [unquote(uri.removeprefix(kind)) for uri in uris if uri.startswith(kind)]
@@ -139,7 +137,6 @@ def drawings(page):
 
 @pytest.fixture(scope="module")
 def text():
-    """The report of two maps."""
     return render_report(a_report(2))
 
 

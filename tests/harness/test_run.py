@@ -284,7 +284,6 @@ def test_corner_cutting_breaks_the_consistency_of_a_run(settings, tmp_path):
 
 
 def rows_of(first, second):
-    """Rows as values of any kind."""
     return [dict[str, Any](row) for row in compare_runs(first, second)]
 
 

@@ -142,8 +142,6 @@ def part(tree: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 def put(kind: str, *keys: str, to: Any) -> Callable[[dict[str, Any]], None]:
-    """Change one value of the description of a part."""
-
     def change(tree: dict[str, Any]) -> None:
         at = part(tree, kind)
         for key in keys[:-1]:

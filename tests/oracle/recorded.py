@@ -42,7 +42,6 @@ class Verdict(NamedTuple):
 
     @property
     def legal(self) -> bool:
-        """Whether all of it is on free ground."""
         return not self.runs
 
 
@@ -140,7 +139,6 @@ def squares(cells: Any) -> Any:
 
 
 def _shape(positions: Any) -> Any:
-    """Return a line, or a point if it goes nowhere."""
     points = np.asarray(positions)[:, ::-1]
     is_point = (points == points[0]).all()
     return shapely.Point(points[0]) if is_point else shapely.LineString(points)

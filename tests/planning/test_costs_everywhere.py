@@ -49,7 +49,6 @@ class Scene(NamedTuple):
         return self.topology.grid
 
     def points(self, pair: Any) -> Any:
-        """The points of two cells."""
         return self.grid.frame.points_of(list(pair))
 
     def least_m(self, pair: Any, shut: Any = None) -> float:

@@ -38,7 +38,6 @@ class ByCells:
         self.n_prepared += 1
 
     def find(self, query: Any) -> Any:
-        """Find the shortest path."""
         found = self._search.search(*query.cells)
         if found.cells is None:
             return Found(None)

@@ -17,8 +17,6 @@ PLANNERS = Path(__file__).parents[2] / "planners"
 
 @pytest.fixture
 def write(tmp_path):
-    """Write a preset file."""
-
     def write(content, name="mine.yaml"):
         path = tmp_path / name
         path.write_bytes(content if isinstance(content, bytes) else content.encode())

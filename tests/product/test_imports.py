@@ -28,7 +28,6 @@ def imports() -> dict[str, set[str]]:
 
 
 def name_of(file: Path) -> str:
-    """Return the dotted name of a module."""
     parts = file.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 

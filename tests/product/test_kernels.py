@@ -134,7 +134,6 @@ def test_kernels_return_no_named_tuples_to_python() -> None:
 
 
 def _is_made(value: ast.expr | None) -> bool:
-    """Whether an expression calls a class."""
     return isinstance(value, ast.Call) and ast.unparse(value.func).rpartition(".")[2][0].isupper()
 
 

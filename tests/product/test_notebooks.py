@@ -43,7 +43,6 @@ def clean_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def executed(notebook: Any, start: Path = ROOT / "notebooks") -> list[Any]:
-    """Run a notebook in a folder and return its outputs."""
     client = NotebookClient(
         notebook,
         timeout=TIMEOUT_S,
@@ -63,7 +62,6 @@ def pictures(outputs: list[Any]) -> int:
 
 
 def settings(notebook: Any) -> Any:
-    """The cell that holds all that a notebook depends on."""
     (cell,) = (cell for cell in notebook.cells if cell.source.startswith("MAP = None"))
     return cell
 

@@ -30,7 +30,6 @@ def older_processors() -> list[dict[str, str]]:
 
 
 def answers(settings: dict[str, str], *options: str) -> dict[str, str]:
-    """Return the answers of a process with these settings."""
     command = [sys.executable, "-m", "tests.answers", *options]
     environment = {**os.environ, **settings}
     run = subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True)

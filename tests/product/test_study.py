@@ -33,7 +33,6 @@ SECTIONS = [
 
 @pytest.fixture(scope="module")
 def published():
-    """The figures of the study, as committed."""
     return json.loads((DOCS / FIGURES).read_text(encoding="utf-8"))
 
 

@@ -128,7 +128,6 @@ class Scenario:
         self.oracle = ShapelyRobot(self.grid, self.corners_m, self.inside)
 
     def poses(self, n: int) -> list[Any]:
-        """Poses anywhere on the map."""
         points = self.frame.points_of_grid(self.rng.random((n, 2)) * self.grid.shape)
         return [np.append(point, self.rng.uniform(-4, 4)) for point in points]
 

@@ -72,7 +72,6 @@ def check_search(  # noqa: PLR0913 - the search's own parameters
 
 
 def cost_of(cells: Any) -> int:
-    """Integer cost of a path."""
     straight, diagonal = moves(cells)
     return straight * STRAIGHT + diagonal * DIAGONAL
 

@@ -105,7 +105,6 @@ def _rows_of(
 
 
 def _parts(whole: slice, most: int) -> list[slice]:
-    """Return shares of a range for all cores, of `most` at most."""
     count = whole.stop - whole.start
     size = max(1, min(most, -(-count // (SHARES * cores()))))
     return [slice(at, min(at + size, whole.stop)) for at in range(whole.start, whole.stop, size)]

@@ -363,7 +363,6 @@ def _after_turn(
 
 
 def _put_first(lists: NDArray[np.uint32], where: BoolArray, k: int) -> None:
-    """Put a move before the others of some lists."""
     lists[where] = lists[where] << 4 | 8 | k
 
 

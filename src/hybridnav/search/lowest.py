@@ -133,7 +133,6 @@ def _holders(record: Record, cells: LongArray, level: int) -> LongArray:
 
 
 def _top_costs(level: Level) -> TopCosts:
-    """Return what the arcs of a level cost."""
     plain, (rows, cols) = ~level.is_self_loop, level.grid.shape
     tops = (level.cells @ np.array([cols, 1]))[level.arcs[plain]]
     distances = level.max_distance_m[plain] / level.grid.resolution_m

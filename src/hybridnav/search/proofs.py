@@ -116,7 +116,6 @@ def moves_of_king(grid: Grid, limit: int, known: tuple[Any, ...]) -> tuple[dict[
 
 
 def _stated(grid: Grid, tree: ByteArray, tilts: ByteArray | None = None) -> dict[str, Any]:
-    """Return the box of a tree, and what is in it."""
     is_shown = tree < OUTSIDE
     if tilts is not None:
         is_shown |= tilts != LEVEL

@@ -207,7 +207,6 @@ def _laid(
     blocks: tuple[LongArray, LongArray],
     before: tuple[AnyArray, ...],
 ) -> Lattice:
-    """Return a lattice with nodes laid in some blocks, and edges of the nodes of some."""
     nodes_of, parts, cells, edges_of, to, costs = before
     is_free = np.ascontiguousarray(free).view(np.uint8)
     factor = np.ascontiguousarray(factors, dtype=np.float32)
