@@ -32,7 +32,6 @@ TWO_DOORS = drawn("..??", "..#?", "..??")
 
 
 def by_class(classes):
-    """Fields: the 4-connected sets of one class, numbered by their first cell."""
     plane = PlaneMap(classes)
     collapse(plane)
     return plane.level().field_of
