@@ -397,13 +397,8 @@ def link_again(tables, places, first, arcs, marked):
             for arc in range(first[old], first[old + 1]):
                 packed = arcs[arc, 1]
                 other = after[packed >> HEAD_SHIFT]
-                if state[node] == _LOST and (
-                    other < 0
-                    or (
-                        state[other] == _JOINED
-                        and not _holds(heads, begin[other], end[other], node)
-                    )
-                ):
+                is_joined = other >= 0 and state[other] == _JOINED
+                if other < 0 or (is_joined and not _holds(heads, begin[other], end[other], node)):
                     continue
                 made[m, 0], made[m, 1] = arcs[arc, 0], other << HEAD_SHIFT | packed & 0xFFF
                 m += 1
@@ -437,8 +432,7 @@ def link_again(tables, places, first, arcs, marked):
 def _had(first, arcs, after, old, other):
     """Return whether there was an arc between corner cells, by the number of the one before, and
     that of the other now."""
-    if old >= 0:
-        for arc in range(first[old], first[old + 1]):
-            if after[arcs[arc, 1] >> HEAD_SHIFT] == other:
-                return True
+    for arc in range(first[old], first[old + 1] if old >= 0 else 0):
+        if after[arcs[arc, 1] >> HEAD_SHIFT] == other:
+            return True
     return False
