@@ -71,16 +71,22 @@ def random_scene(seed: int, *, side: int = 7, n_ends: int = 3) -> Scene | None:
     free = rng.random((rows, cols)) > rng.choice([0, 0.05, 0.15, 0.3])
     if not free.any():
         return None
-    sides: list[tuple[int, ...]] = []
-    for _ in range(rng.integers(1, 7)):
-        sides += _line(rng, rows, cols)
+    sides = random_sides(rng, rows, cols)
     cells = np.argwhere(free)
     ends = []
     for row, col in cells[rng.integers(len(cells), size=n_ends)].tolist():
         up, across = rng.choice([0, 4, 4, 8, int(rng.integers(0, _PARTS + 1))], 2).tolist()
         point = Fraction(row * _PARTS + up, _PARTS), Fraction(col * _PARTS + across, _PARTS)
         ends.append(((row, col), point))
-    return Scene(free, np.array(sides, np.int32).reshape(-1, 4), ends)
+    return Scene(free, sides, ends)
+
+
+def random_sides(rng: np.random.Generator, rows: int, cols: int) -> NDArray[np.int32]:
+    """Directed sides of one to six lines, int32 (n, 4)."""
+    sides: list[tuple[int, ...]] = []
+    for _ in range(rng.integers(1, 7)):
+        sides += _line(rng, rows, cols)
+    return np.array(sides, np.int32).reshape(-1, 4)
 
 
 def _line(rng: np.random.Generator, rows: int, cols: int) -> list[tuple[int, ...]]:
@@ -157,6 +163,15 @@ def _exact(at: float) -> Fraction:
     return Fraction(round(at)) if abs(at - round(at)) < 1e-9 else Fraction(at)
 
 
+def _all_faults(seed: int, preset: str, given: argparse.Namespace) -> Iterator[str]:
+    if given.floors:
+        from tests.ext.fleet.directed import floor_faults  # it draws lines as this module does
+
+        return floor_faults(seed, preset)
+    scene = random_scene(seed, side=given.side)
+    return faults(scene, preset) if scene else iter(())
+
+
 def main() -> int:
     """Attack presets; return 1 if anything is wrong."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -164,12 +179,12 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0, help="seed of the first map")
     parser.add_argument("--presets", nargs="+", default=PRESETS)
     parser.add_argument("--side", type=int, default=7, help="most cells of a side of a map")
+    parser.add_argument("--floors", action="store_true", help="buildings in place of maps")
     given = parser.parse_args()
     found, began = 0, time.process_time()
     for seed in range(given.first, given.first + given.maps):
-        scene = random_scene(seed, side=given.side)
-        for preset in given.presets if scene else ():
-            for fault in faults(scene, preset):  # type: ignore[arg-type]
+        for preset in given.presets:
+            for fault in _all_faults(seed, preset, given):
                 found += 1
                 sys.stdout.write(f"map {seed}: {fault}\n")
         if seed % 500 == 499:

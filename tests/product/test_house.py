@@ -29,7 +29,7 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
-    "lines of tests": 71_340,
+    "lines of tests": 71_560,
 }
 
 BUDGETS = {

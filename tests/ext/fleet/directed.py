@@ -1,0 +1,91 @@
+"""Routes over floors with directed lines and closed cells, held against an oracle of the parts."""
+
+import itertools
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+from typing import Any
+
+import networkx as nx
+import numpy as np
+
+import hybridnav as hn
+from tests.ext.fleet.scenes import Scene, charge, random_building, usable
+from tests.one_way import CELLS, random_sides
+from tests.oracle.one_way import OneWayPlane
+
+Cell = tuple[int, int]
+Spot = tuple[int, Cell]
+"""Index of a floor, and a cell on it."""
+
+
+def floor_faults(seed: int, preset: str, *, n_queries: int = 3) -> Iterator[str]:
+    """What is wrong with the routes over the two or three floors of a random building, of which
+    each has one to six lines, and some closed cells."""
+    scene = random_building(seed, preset=preset, most_floors=3, shape=(6, 7))
+    rng = np.random.default_rng([64, seed])
+    for _ in range(n_queries):
+        ends = scene.somewhere(), scene.somewhere()
+        spots = [spot_of(scene, index, point) for index, point in ends]
+        planes, blocked = [], {}
+        for index, floor in enumerate(scene.building.floors):
+            free, sides = scene.grids[index].enterable().copy(), random_sides(rng, 6, 7)
+            shut = free & (rng.random(free.shape) < rng.choice([0.0, 0.1]))
+            for _, cell in (spot for spot in spots if spot[0] == index):
+                shut[cell] = False
+            free &= ~shut
+            planes.append(OneWayPlane(free, sides))
+            blocked[floor.name] = hn.Blocked(cells=np.argwhere(shut), one_way={"sides": sides})
+        plan = scene.building.plan(*map(scene.named, ends), blocked=blocked)
+        least = optimum(scene, planes, spots, by_cells=preset in CELLS)
+        asked = f"building {seed}, {preset} from {spots[0]} to {spots[1]}: "
+        if plan.solved != math.isfinite(least):
+            yield f"{asked}{plan.status}, the optimum is {least}"
+        elif plan.solved and (plan.cost < least - 1e-9 or plan.lower_bound > least + 1e-9):
+            yield f"{asked}cost {plan.cost}, bound {plan.lower_bound}, the optimum is {least}"
+        elif plan.solved and preset != "paper" and plan.cost > least + 1e-9:
+            yield f"{asked}cost {plan.cost}, the optimum is {least}"
+
+
+def spot_of(scene: Scene, index: int, point: Any) -> Spot:
+    """The cell of a point on a floor."""
+    return index, scene.grids[index].frame.cell_of(*point)
+
+
+def optimum(scene: Scene, planes: list[OneWayPlane], ends: list[Spot], *, by_cells: bool) -> float:
+    """The least cost from one spot to another: directed lengths on floors, charges of rides."""
+    building = scene.building
+    number = {floor.name: k for k, floor in enumerate(building.floors)}
+    graph: nx.DiGraph[Spot] = nx.DiGraph()
+    graph.add_nodes_from(ends)
+    for link in usable(scene, set(), stairs=True):
+        spots = [spot_of(scene, number[end.floor], end.position_m) for end in link.ends]
+        for (k, one), (n, two) in itertools.permutations(list(enumerate(spots)), 2):
+            weight = charge(link, k, n, building.speed_m_s)
+            if weight < graph.get_edge_data(one, two, {"weight": math.inf})["weight"]:
+                graph.add_edge(one, two, weight=weight)
+    for index, plane in enumerate(planes):
+        spots = [spot for spot in graph if spot[0] == index]
+        closed = [spot for spot in spots if not plane.free[spot[1]]]
+        graph.remove_nodes_from(closed)
+        spots = [spot for spot in spots if spot not in closed]
+        for one, two, cells in lengths(plane, spots, by_cells=by_cells):
+            if math.isfinite(cells):
+                graph.add_edge(one, two, weight=cells * scene.grids[index].resolution_m)
+    found = nx.single_source_dijkstra_path_length(graph, ends[0])
+    return float(found.get(ends[1], math.inf))
+
+
+def lengths(
+    plane: OneWayPlane, spots: list[Spot], *, by_cells: bool
+) -> Iterator[tuple[Spot, Spot, float]]:
+    """The directed lengths between the centres of cells, in cells."""
+    if by_cells:
+        for one, two in itertools.permutations(spots, 2):
+            yield one, two, plane.cells_length(one[1], two[1])
+        return
+    half = Fraction(1, 2)
+    placed = [(cell, (cell[0] + half, cell[1] + half)) for _, cell in spots]
+    table = plane.lengths(placed, placed) if placed else np.empty((0, 0))
+    for (i, one), (j, two) in itertools.permutations(list(enumerate(spots)), 2):
+        yield one, two, float(table[i, j])
