@@ -38,6 +38,8 @@ def test_a_route_over_floors_is_printed(cli: Any, file: Path) -> None:
     assert answer["cost"] == plan.cost
     assert answer["floors"] == ["1", "2"]
     assert answer["rides"][0]["link"] == "ladder"
+    spaced = cli("plan", file, "--from", "2: room-1", "--to", "1: 0.5,0.5")
+    assert (spaced.code, "solved" in spaced.out) == (0, True)  # as on the page
 
 
 def test_links_and_doors_are_closed(cli: Any, file: Path) -> None:

@@ -81,7 +81,7 @@ def test_lanes_keep_the_ids_of_a_graph_before(cli, tmp_path):
     [
         ("export", "--style", "graphs are lanes"),
         ("export", "--nodes", "a larger --spacing"),
-        ("evaluate", "--methods", "RunSettings(methods=)"),
+        ("evaluate", "--methods", "--preset and --baseline, or in Python RunSettings(methods=)"),
     ],
 )
 def test_options_that_went_say_what_to_do_instead(cli, command, option, instead):

@@ -166,7 +166,7 @@ def run(arguments: list[str]) -> int:
 
 
 _GONE = {
-    "--methods": "name methods in Python, RunSettings(methods=)",
+    "--methods": "give --preset and --baseline, or in Python RunSettings(methods=)",
     "--nodes": "fewer nodes come of a larger --spacing",
     "--style": "leave it out, graphs are lanes",
 }

@@ -222,10 +222,9 @@ def test_two_pages_do_not_lose_each_others_names(context: Any, client: Client) -
     seen = set()
 
     def once(route: Any) -> None:  # a page that looks again may see the new name before its click
-        page = route.request.frame.page
-        if page not in seen:
+        if (page := route.request.frame.page) not in seen:
+            seen.add(page)
             route.continue_()
-        seen.add(page)
 
     context.route("**/closed.json", once)
     one, other = Shown(context, client.address), Shown(context, client.address)

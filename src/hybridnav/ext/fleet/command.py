@@ -272,7 +272,7 @@ def _endpoint(text: str, building: hn.ext.fleet.Building) -> Any:
     # The longest name first: one floor may be called as another one with a colon.
     for name in sorted(floors, key=len, reverse=True):
         if text.startswith(f"{name}:"):
-            rest = text[len(name) + 1 :]
+            rest = text[len(name) + 1 :].strip()
             point = read_point(rest)
             if point is None:
                 return name, rest
