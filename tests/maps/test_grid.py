@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from scipy import ndimage
 from shapely import Polygon, box
 
 import hybridnav as hn
@@ -15,9 +16,9 @@ from hybridnav._base.rows import in_runs, unique_rows
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.areas import box_of_area
-from hybridnav.maps.clearance import within_radius
+from hybridnav.maps.clearance import clearance_cells, within_radius
 from hybridnav.maps.geometry import centres, position_of
-from tests.strategies import examples
+from tests.strategies import class_grids, examples
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED
 
@@ -303,3 +304,12 @@ def test_distinct_rows_are_those_of_numpy(kind: type, width: int, drawn: list[in
     for one, other in zip(found, expected, strict=True):
         assert one.tolist() == other.reshape(one.shape).tolist()
     assert found.rows.dtype == kind
+
+
+@given(class_grids(24))
+def test_clearances_are_those_of_scipy_to_the_last_bit(classes):
+    """scipy 1.17.1, ndimage.distance_transform_edt, which needs an occupied cell."""
+    occupied = classes == 0
+    found = clearance_cells(occupied)
+    expected = ndimage.distance_transform_edt(~occupied) if occupied.any() else np.inf
+    assert (found == expected).all()

@@ -27,7 +27,6 @@ def levels_of(scene, linkage):
 
 
 def check_walks(level):
-    """Faces are the walks round them, numbered in the order of their first darts."""
     dual = level.dual
     walks = sorted(phi_walks(level), key=min)
     assert dual.n_faces == len(walks) == len(dual.kinds)
@@ -69,7 +68,6 @@ def canonical_walk(walk, field_of, found):
 
 
 def faces_of(level, found):
-    """Kind of each face and the boundaries that meet in it, in turn."""
     label = np.full(level.n_arcs, -1)
     label[~level.is_self_loop] = [found.label_of[dart] for dart in crossing_darts(level)]
     origin = level.arcs.ravel()

@@ -116,7 +116,6 @@ def test_parallel_arcs_and_self_loops_stay_what_they_are(figure1):
 
 
 def test_the_dual_tells_the_island_from_the_neighbour(figure1):
-    """The two boundaries of the neighbour join hole and outside, the island's is a ring."""
     dual = figure1.dual_to_networkx()
     face = {data["kind"]: face for face, data in dual.nodes(data=True)}
     assert dual.number_of_edges(face["outside"], face["protected"]) == 2

@@ -38,7 +38,6 @@ GOLDEN = {
 
 
 def noise(seed, shape, unexplored, occupied):
-    """Map of independent cells; Generator.random of PCG64 is a stable stream."""
     value = np.random.Generator(np.random.PCG64(seed)).random(shape)
     probability = np.where(value < occupied, 1.0, np.where(value < occupied + unexplored, 0.5, 0.0))
     return OccupancyGrid(probability, Frame(0.05), robot_radius_m=0)

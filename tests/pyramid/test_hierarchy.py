@@ -95,7 +95,6 @@ def check_kernels(pyramid):
 
 
 def check_replay(pyramid, classes):
-    """The kernels lead from the base to each level, dart by dart, by the rules of removal."""
     plane = PlaneMap(classes)
     for lower, upper in itertools.pairwise(pyramid):
         darts = base_darts(lower.base_pairs)

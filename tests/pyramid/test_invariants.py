@@ -256,7 +256,6 @@ DISTANCES = settings(max_examples=examples(30), deadline=None, derandomize=True)
 
 @st.composite
 def open_scenes(draw):
-    """Mostly open ground, with a few obstacles and islands."""
     shape = tuple(draw(st.integers(2, max(2, MAX_SIDE))) for _ in range(2))
     classes = np.full(shape, draw(st.sampled_from([1, 2])), dtype=np.uint8)
     for _ in range(draw(st.integers(0, 4))):

@@ -44,7 +44,6 @@ def above(pyramid: hn.DualGraphPyramid) -> list[Level]:
 
 
 def mergeable(level: Level, most_cells: float = np.inf) -> Any:
-    """Arcs between two fields of one class that have at most so many cells together."""
     same = level.classes[level.arcs[:, 0]] == level.classes[level.arcs[:, 1]]
     small = level.areas[level.arcs].sum(axis=1) <= most_cells
     return np.flatnonzero(same & small & ~level.is_self_loop)

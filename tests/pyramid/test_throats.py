@@ -41,7 +41,6 @@ def test_no_place_has_cells_of_two_parts(classes, distance):
 
 
 def two_rooms(rng, resolution_m):
-    """Two rooms and the two doors between them, as windows of rows and columns."""
     cells = lambda low, high: round(rng.uniform(low, high) / resolution_m)  # noqa: E731
     height, widths, wall = cells(5, 7), (cells(3, 6), cells(3, 6)), cells(0.1, 0.4)
     classes = np.zeros((height + 2, sum(widths) + wall + 2), np.uint8)

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridnav._base.trig import dist, hypots
 from hybridnav._base.typing import FloatArray, LongArray
+from hybridnav.graphs.kernels import bends
 from hybridnav.graphs.sketch import DOOR, END, NOTHING, ROOM, Sketch
 from hybridnav.graphs.strands import Passage, Strand, crosses, is_beside, length_between
 
@@ -209,24 +210,12 @@ class ChainGraph:
         # With more room than is asked for, there is no need to keep to the middle.
         sway = np.maximum(np.maximum(_SWAY * room, _LEAST_SWAY), room - comfort)
         weights = np.gradient(picks.astype(np.float64)) if count > 1 else np.ones(count)
-        best, before = np.full(count, np.inf), np.zeros(count, dtype=np.int64)
-        best[0] = 0.0
-        for at in range(1, count):
-            first = max(0, at - _REACH)
-            tails = points[first:at]
-            heads = np.repeat(points[at : at + 1], at - first, axis=0)
-            narrow = np.minimum.accumulate(room[first : at + 1][::-1])[:0:-1]
-            fits = self._passage.least(tails, heads) >= np.minimum(comfort, _KEPT * narrow)
-            fits[-1] = True
-            steps = heads - tails
-            lengths = np.maximum(hypots(steps[:, 0], steps[:, 1]), 1e-9)
-            for k in np.flatnonzero(fits).tolist():
-                inner = slice(first + k, at + 1)
-                normal = np.array([-steps[k, 1], steps[k, 0]]) / lengths[k]
-                off = (points[inner] - tails[k]) @ normal / sway[inner]
-                cost = best[first + k] + bend + float((off**2 * weights[inner]).sum())
-                if cost < best[at]:
-                    best[at], before[at] = cost, first + k
+        heads = np.arange(1, count)
+        reached = np.minimum(heads, _REACH)
+        tails = np.arange(reached.sum()) - np.repeat(reached.cumsum() - heads, reached)
+        least = self._passage.least(points[tails], points[np.repeat(heads, reached)])
+        asked = np.minimum(comfort, _KEPT * room)
+        before = bends(points, weights, sway, least, asked, bend, _REACH)
         cuts = [count - 1]
         while cuts[-1]:
             cuts.append(int(before[cuts[-1]]))

@@ -161,21 +161,9 @@ def least_widths(occupied, tails, heads, reach):
 def least_along(free, values, positions, edges):
     """Return the least value of the cells that each edge passes, and the cell in its middle.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols).
-    values
-        float (rows, cols).
-    positions
-        float64 (n, 2), the nodes, (row, col) in grid units.
-    edges
-        int64 (m, 2), tail and head of each edge.
-
-    Returns
-    -------
-    tuple
-        float64 (m,), and int64 (m, 2), (row, col).
+    `free`, `values`: bool and float (rows, cols); `positions`: float64 (n, 2), the nodes, (row,
+    col) in grid units; `edges`: int64 (m, 2), tail and head of each. Returns float64 (m,), and
+    int64 (m, 2), (row, col).
     """
     least, middles = np.full(len(edges), np.inf), np.empty((len(edges), 2), np.int64)
     line = np.empty((2, 2))
@@ -186,6 +174,35 @@ def least_along(free, values, positions, edges):
             least[edge] = min(least[edge], values[cells[k, 0], cells[k, 1]])
         middles[edge] = cells[len(cells) // 2]
     return least, middles
+
+
+@njit(cache=True, nogil=True)
+def bends(points, weights, sway, least, asked, bend, reach):
+    """Return the point before each point of a chain on the edges of least cost, int64 (n,).
+
+    `points`, `weights`, `sway`, `asked`: float64 (n, 2) and (n,), the chain, what its points count,
+    how far off they may be at little cost, and the clearance to be kept; `least`: float64, the
+    clearance of the edges to each point from the up to `reach` points before, in order; `bend`:
+    cost of an edge. The other costs are how far points lie off, squared.
+    """
+    best, before = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
+    best[0], behind = 0.0, 0
+    for at in range(1, len(points)):
+        behind += min(at, reach)
+        low = asked[at]
+        for k in range(at - 1, max(0, at - reach) - 1, -1):
+            low = min(low, asked[k])
+            if k < at - 1 and least[behind - at + k] < low:
+                continue
+            down, across = points[at, 0] - points[k, 0], points[at, 1] - points[k, 1]
+            cost = 0.0
+            for i in range(k, at + 1):
+                off = (points[i, 1] - points[k, 1]) * down - (points[i, 0] - points[k, 0]) * across
+                cost += (off / sway[i]) ** 2 * weights[i]
+            cost = best[k] + bend + cost / max(down * down + across * across, 1e-18)
+            if cost <= best[at]:
+                best[at], before[at] = cost, k
+    return before
 
 
 # Kernels of skeletons: thinning in the order of clearance, and distances from lines.
@@ -214,22 +231,11 @@ def _is_simple(inside, row, col):
 def thinned(inside, clearance, order, anchors):
     """Thin a set of cells to 4-connected lines, the cells nearest to obstacles first.
 
-    Parameters
-    ----------
-    inside
-        bool (rows, cols), changed in place; false along its rim.
-    clearance
-        float64 (rows, cols).
-    order
-        int64 (k,), the flat cells of the set by clearance.
-    anchors
-        bool (rows, cols), cells that stay.
-
-    Notes
-    -----
-    C. Pudney: Distance-ordered homotopic thinning, 1998. A cell that had to stay is tried again as
-    soon as a neighbour goes: so ends without an anchor shrink away.
-    """
+    `inside`: bool (rows, cols), changed in place; false along its rim; `clearance`: float64 (rows,
+    cols); `order`: int64 (k,), the flat cells of the set by clearance; `anchors`: bool (rows,
+    cols), cells that stay; `Notes`: ; `-----`: ; `C. Pudney: Distance-ordered homotopic thinning`,
+    `1998. A cell that had to stay is tried again as`: ; `soon as a neighbour goes: so ends without
+    an anchor shrink away.`: ."""
     cols = inside.shape[1]
     waiting = np.empty(8 * len(order) + 8, np.int64)
     for k in range(len(order)):
@@ -255,18 +261,9 @@ def thinned(inside, clearance, order, anchors):
 def spread(free, sources):
     """Return how many steps each cell lies from the nearest of some cells, int32, -1 out of reach.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), false along its rim.
-    sources
-        int64 (k,), flat cells.
-
-    Notes
-    -----
-    Steps go to 4 and 8 neighbours in turn, so that the cells within a distance make an octagon: it
-    is Euclidean within a tenth, where steps are scaled by 1.2.
-    """
+    `free`: bool (rows, cols), false along its rim; `sources`: int64 (k,), flat cells; `Notes`: ;
+    `-----`: ; `Steps go to 4 and 8 neighbours in turn`, `so that the cells within a distance make
+    an octagon: it`: ; `is Euclidean within a tenth`, `where steps are scaled by 1.2.`: ."""
     cols = free.shape[1]
     steps = np.full(free.shape, -1, np.int32)
     queue = np.empty(free.size, np.int64)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from hybridnav._base.trig import cos, hypots, sin
-from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.graphs.free_space import FreeSpace
 from hybridnav.graphs.kernels import least_along, spread, thinned
 from hybridnav.maps.clearance import clearance_cells
@@ -160,22 +160,22 @@ def _uncovered(away: FloatArray, clearance: FloatArray, layout: Layout) -> LongA
     cover = COVER * layout.apart
     far = (away > cover) & (clearance >= layout.least)
     parts, count = ndimage.label(far)
-    room = np.minimum(clearance, cover / 3)
-    far &= room >= _most(room[far], parts[far], count)[parts] - _MIDDLE_CELLS
-    far &= away >= _most(away[far], parts[far], count)[parts] - _FARTHEST * layout.apart
-    part = parts[far]
+    at = np.flatnonzero(far)
+    part = parts.ravel()[at]
+    for of, most, slack in (
+        (clearance, cover / 3, _MIDDLE_CELLS),
+        (away, np.inf, _FARTHEST * layout.apart),
+    ):
+        values = np.minimum(of.ravel()[at], most)
+        most_of = np.zeros(count + 1)
+        np.maximum.at(most_of, part, values)
+        kept = values >= most_of[part] - slack
+        at, part = at[kept], part[kept]
     n_cells = np.bincount(part, minlength=count + 1)[part]
-    off = [n_cells * x - np.bincount(part, weights=x)[part] for x in np.nonzero(far)]
+    off = [n_cells * x - np.bincount(part, weights=x)[part] for x in divmod(at, far.shape[1])]
     order = np.lexsort((off[0] ** 2 + off[1] ** 2, part))
-    found: LongArray = np.flatnonzero(far)[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
+    found: LongArray = at[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
     return found
-
-
-def _most(values: FloatArray, part: AnyArray, count: int) -> FloatArray:
-    """Return the greatest value of each part, from 1 to a number of them."""
-    most = np.zeros(count + 1)
-    np.maximum.at(most, part, values)
-    return most
 
 
 _SIDES = ((0, 1), (-1, 0), (0, -1), (1, 0))

@@ -289,3 +289,47 @@ def joined_in_order(order, shape, diagonal):
                 size[one] += size[other]
                 time[other] = k
     return parent, time
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def nearest_distances(occupied):
+    """Return the distance from each cell to the nearest occupied one, float64, infinite for none.
+
+    First along columns, then along rows by the lower envelope of parabolas (P. Felzenszwalb,
+    D. Huttenlocher: Distance transforms of sampled functions, 2012). Squares are whole numbers
+    below 2^53, so results are those of any exact way.
+    """
+    rows, cols = occupied.shape
+    found = np.empty((rows, cols))
+    for row in range(rows):
+        for col in range(cols):
+            above = found[row - 1, col] + 1 if row > 0 else np.inf
+            found[row, col] = 0.0 if occupied[row, col] else above
+    below, squares = np.full(cols, np.inf), np.empty(cols)
+    at, begin = np.empty(cols, np.int64), np.empty(cols, np.int64)
+    for row in range(rows - 1, -1, -1):
+        count = 0
+        for col in range(cols):
+            below[col] = min(found[row, col], below[col] + 1)
+            squares[col] = below[col] * below[col]
+            if squares[col] == np.inf:
+                continue
+            from_ = 0  # where this parabola becomes the lowest
+            while count > 0:
+                last = at[count - 1]
+                rise = squares[col] - squares[last] + (col * col - last * last)
+                from_ = np.int64(np.floor(rise / (2 * (col - last)))) + 1
+                if from_ > begin[count - 1]:
+                    break
+                count -= 1
+                from_ = 0
+            at[count], begin[count] = col, from_
+            count += 1
+        k = 0
+        for col in range(cols):
+            while k + 1 < count and begin[k + 1] <= col:
+                k += 1
+            away = col - at[k]
+            found[row, col] = np.sqrt(away * away + squares[at[k]]) if count > 0 else np.inf
+    return found

@@ -262,21 +262,11 @@ class Decimation:
         return count
 
     def _try_candidates(self) -> int:
-        return int(
-            _kernels.contractible(
-                self._darts.origin,
-                self._darts.base_edge,
-                self._vertices,
-                self._hulls,
-                self._level,
-                self._linkage,
-                self._limit,
-                self._order,
-                self._scratch.keys,
-                self._scratch.state,
-                self._scratch.best,
-            )
-        )
+        darts, scratch, hulls = self._darts, self._scratch, self._hulls
+        of_level = self._level, self._linkage, self._limit, self._order
+        filled = scratch.keys, scratch.state, scratch.best
+        at = darts.origin, darts.base_edge, self._vertices
+        return int(_kernels.contractible(*at, hulls, *of_level, *filled))
 
     def _find_steered(self, steering: Steering) -> int:
         """Fill the keys with the arcs that the steering offers, and return their number."""

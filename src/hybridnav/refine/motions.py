@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
+from hybridnav.maps.clearance import clearance_cells
 from hybridnav.refine.kernels import motions as kernels
 from hybridnav.refine.kernels.sweep import Body, look_ahead
 
@@ -108,7 +109,10 @@ class MotionCheck:
         if solid is not None and not self._is_disc:
             occupied = self._grid.measured == CellClass.OCCUPIED
             occupied.flat[solid] = True
-            around = {"ahead": look_ahead(occupied), "clearance": _distance_cells(occupied)}
+            around = {
+                "ahead": look_ahead(occupied),
+                "clearance": clearance_cells(occupied).astype(np.float32),
+            }
             other._body = self._body._replace(**around)  # noqa: SLF001
         return other
 
@@ -346,18 +350,8 @@ def _body_of(grid: OccupancyGrid, shape: ArrayLike | Footprint) -> Body:
     occupied = grid.measured == CellClass.OCCUPIED
     return Body(
         look_ahead(occupied),
-        _distance_cells(occupied),
+        clearance_cells(occupied).astype(np.float32),
         np.concatenate(parts) / grid.resolution_m,
         offsets.astype(np.int64),
         radii,
     )
-
-
-def _distance_cells(occupied: BoolArray) -> Any:
-    """Return the distance from each centre to the nearest occupied one in cells, float32 (rows,
-    cols)."""
-    if not occupied.any():
-        return np.full(occupied.shape, np.inf, dtype=np.float32)
-    from scipy import ndimage  # noqa: PLC0415 - half a second that a disc does not need
-
-    return ndimage.distance_transform_edt(~occupied).astype(np.float32)

@@ -93,7 +93,7 @@ class Ground:
             small[0] = False
             free = free | small[holes]
             occupied = occupied | _rim(free)
-        near = ndimage.distance_transform_edt(~free) * resolution_m <= _RIM_M
+        near = clearance_cells(~free) * resolution_m <= _RIM_M
         clearance = clearance_cells(occupied)
         clearance[~np.isfinite(clearance)] = 1.0
         return cls(free, occupied & near, clearance, resolution_m)

@@ -20,6 +20,7 @@ from scipy import ndimage
 from hybridnav._base.trig import lengths_along
 from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels
+from hybridnav.maps.clearance import clearance_cells
 from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas
 from hybridnav.viz.layout import text_width
@@ -340,7 +341,7 @@ def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -
 
     The farthest point is first.
     """
-    depth = ndimage.distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
+    depth = clearance_cells(np.pad(~inside, 1, constant_values=True))[1:-1, 1:-1]
     rows, cols = np.indices((_PARTS, _PARTS)).reshape(2, -1)
     deepest = []
     for row, col in zip(rows.tolist(), cols.tolist(), strict=True):

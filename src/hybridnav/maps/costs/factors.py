@@ -18,7 +18,7 @@ from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, L
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.maps import CellClass, Frame, OccupancyGrid
 from hybridnav.maps.cells import MAX_CELLS, Box
-from hybridnav.maps.clearance import FEW_ROWS, clearance_cells, squares_near
+from hybridnav.maps.clearance import clearance_cells
 
 UNIT_BITS = 14
 """Factors are whole multiples of 2^-14."""
@@ -170,25 +170,13 @@ def inflated_costs(
     resolution_m = grid.resolution_m
     occupied = grid.measured == CellClass.OCCUPIED
     reach = min(math.ceil(inflation_m / resolution_m), sum(grid.shape))
-    if reach <= FEW_ROWS:  # the quick way: a table for all squares
-        cost_of = [
-            cost_at(math.sqrt(number) * resolution_m, scaling, inscribed_m)
-            for number in range(reach**2 + 1)
-        ]
-        beyond = squares_near(occupied, reach)
-        return np.array([*cost_of, 0], dtype=np.uint8)[np.minimum(beyond, reach**2 + 1)]
-    distance = clearance_cells(occupied)
-    costs = np.zeros(grid.shape, dtype=np.uint8)
-    is_near = distance <= reach
     # Distances between centres are roots of whole numbers.
-    squared = np.rint(distance[is_near] ** 2).astype(np.int64)
-    present, at = np.unique(squared, return_inverse=True)
-    cost_of = [
-        cost_at(math.sqrt(number) * resolution_m, scaling, inscribed_m)
-        for number in present.tolist()
-    ]
-    costs[is_near] = np.array(cost_of, dtype=np.uint8)[at]
-    return costs
+    squared = np.rint(np.minimum(clearance_cells(occupied), reach + 1) ** 2).astype(np.int64)
+    present = np.flatnonzero(np.bincount(squared.ravel()))
+    cost_of = np.zeros((reach + 1) ** 2 + 1, dtype=np.uint8)
+    for number in present[present <= reach**2].tolist():
+        cost_of[number] = cost_at(math.sqrt(number) * resolution_m, scaling, inscribed_m)
+    return cost_of[squared]
 
 
 # --- filter masks: speed limits and keepout zones -------------------------------------------------
