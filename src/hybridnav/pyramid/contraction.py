@@ -23,7 +23,11 @@ from hybridnav.pyramid.start import N_CLASSES, Start
 
 
 class Scratch(NamedTuple):
-    """Work space of all levels: 17 bytes an edge and 21 a vertex, shared by consecutive passes."""
+    """Work space of all levels: 17 bytes an edge and 21 a vertex, shared by consecutive passes.
+
+    By edge: `keys`, `rest`, `state`; by vertex: `best`, `matched`, `parent`, `kernel_dart`,
+    `has_leaf`.
+    """
 
     keys: KeyArray
     rest: KeyArray

@@ -208,7 +208,8 @@ def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, al
 def reduce_face(start, darts, any_loop, state, inverse, cols, whole_at, level):
     """Remove redundant edges through the face of a dart until none is left or one has to wait.
 
-    A removal can make only the merged face redundant, so it is followed. Parameters as `simplify`.
+    A removal can make only the merged face redundant, so it is followed. `start`: the dart;
+    `darts`, `any_loop`, `state`, `inverse`, `cols`, `whole_at`, `level`: see `simplify`.
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
     protected, base_edge = darts.protected, darts.base_edge

@@ -97,7 +97,11 @@ def merged_hulls(start, points, merged_into, n_vertices):
 
 @njit(cache=True, nogil=True, _nrt=False)
 def add_chain(start, points, part, hand, rows, cols, count):
-    """Add one half of a hull to points sorted by row, of which the outermost of each row stays."""
+    """Add one half of a hull to points sorted by row, of which the outermost of each row stays.
+
+    `start`, `points`, `part`: the points of each hull, and which one; `hand`: 1 for the right half,
+    -1 for the left; `rows`, `cols`, `count`: the points so far, filled in, and their number.
+    """
     low, high = start[part], start[part + 1]
     right = low + 1  # where the rows of the right half begin anew
     while points[right, 0] > points[right - 1, 0]:
