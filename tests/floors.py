@@ -78,7 +78,6 @@ class Floor:
         return graph
 
     def rooms_passed(self, start: Cell, darts: list[Any]) -> list[int]:
-        """The rooms of a path over darts."""
         rooms = [self.room_of(start)]
         return rooms + [self.room_of(self.doors[number][1 - half]) for number, half in darts]
 

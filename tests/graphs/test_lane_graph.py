@@ -150,7 +150,6 @@ def test_a_small_post_has_a_lane_on_one_side_only():
 
 
 def changed(topology, seed):
-    """The map with boxes on a hundredth of its free cells."""
     grid, rng = topology.grid, np.random.default_rng(seed)
     cells = np.where(grid.measured == hn.CellClass.FREE, 0.0, 1.0)
     free = np.argwhere(cells == 0)

@@ -389,7 +389,6 @@ class OwnGridOrNothing(SoundLine):
 
 
 def length_of(points: NDArray[np.float64]) -> float:
-    """Metres along some points."""
     steps = np.diff(points, axis=0)
     return math.fsum(np.hypot(steps[:, 0], steps[:, 1]).tolist())
 

@@ -57,7 +57,6 @@ class OneWayPlane:
 
     @cached_property
     def _moves(self) -> csr_array:
-        """The lengths of all moves, between flat cells."""
         tails, heads, lengths = [], [], []
         n = self.free.size
         for row, col in np.argwhere(self.free).tolist():

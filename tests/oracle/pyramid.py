@@ -136,7 +136,6 @@ class Boundaries:
 
 
 def boundaries(field_of: AnyArray) -> Boundaries:
-    """Boundaries between the fields, from the definition of the crack oracle."""
     rows, cols = field_of.shape
     east = _differ(field_of[:, :-1], field_of[:, 1:])
     north = _differ(field_of[:-1], field_of[1:])

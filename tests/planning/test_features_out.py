@@ -42,7 +42,6 @@ def features_of(path: Path) -> Any:
 
 
 def planned(points: Any, headings: Any = None, *, curved: bool = False) -> hn.PlanResult:
-    """A result whose path has these points."""
     points = np.array(points, dtype=np.float64)
     length = math.pi if curved else float(np.hypot(*np.diff(points, axis=0).T).sum())
     headings = None if headings is None else np.array(headings, dtype=np.float64)

@@ -27,7 +27,6 @@ FRAMES = (hn.Frame(1.0), hn.Frame(0.05, (12.3, -400.0), 0.7), hn.Frame(0.1, (5e5
 
 
 def mapped(classes: Any, frame: hn.Frame = FRAMES[0]) -> hn.TopologicalMap:
-    """The topological map of cells with these classes."""
     probability = occupancy_grid(classes).probability
     grid = hn.OccupancyGrid(probability, frame, robot_radius_m=0)
     return hn.TopologicalMap(hn.DualGraphPyramid.build(grid, merge_distance_m=4 * 0.05))

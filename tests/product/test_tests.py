@@ -40,7 +40,6 @@ def listed(file: Path) -> set[str]:
 
 
 def public_names(private: str) -> set[str]:
-    """Return what the public modules beside a private one list."""
     folder = SOURCE.joinpath(*private.replace(".kernels.", ".").split(".")[1:-1])
     return {
         name for file in folder.glob("*.py") if not is_private(file.stem) for name in listed(file)

@@ -163,7 +163,6 @@ def walked(planner, ends, closed):
 
 
 def why_of(result: hn.PlanResult) -> Any:
-    """The explanation of a result without a path."""
     assert result.explanation is not None
     return result.explanation
 

@@ -47,7 +47,6 @@ class Growth:
         self.shape = self._label_of.shape
 
     def steering(self, field_of: IntArray, n_vertices: int) -> GrowingSegments:
-        """Return the steering from a level on whose fields are the segments."""
         inside = field_of >= 0
         segment_of = np.full(n_vertices, -1, dtype=np.int64)
         segment_of[field_of[inside]] = self._label_of.ravel()[inside]

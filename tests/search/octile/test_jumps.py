@@ -45,7 +45,6 @@ def searches(free: NDArray[np.bool_]) -> tuple[JumpSearch, JumpSearch]:
 def assert_shortest(
     found: JumpPath, free: NDArray[np.bool_], endpoints: tuple[Cell, Cell], optimum: float
 ) -> None:
-    """Assert that an answer is right, by the length of a shortest path."""
     if math.isinf(optimum):
         assert found.cells is None
         assert found.length_cells == math.inf
