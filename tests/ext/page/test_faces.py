@@ -330,8 +330,7 @@ def test_every_text_of_the_page_stands_in_the_tables() -> None:
         ),
         ("the line does not cut 'a' in two", "die Linie teilt 'a' nicht"),
         (
-            "door 3 joins a and b, and leads into no 'c': name the room that it leads into, None "
-            "for unnamed space",
+            "door 3 joins a and b, and leads into no 'c': name the room that it leads into",
             "Tür 3 führt nicht nach c",
         ),
     ],
