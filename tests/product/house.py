@@ -223,6 +223,25 @@ def _is_named(name: str, head: str) -> bool:
     return name in head or any(begin in head.lower() for begin in begins)
 
 
+def functions_with(name: str) -> int:
+    """Return how many functions name a value or a parameter so, those inside them apart."""
+    count = 0
+    for path in SRC.rglob("*.py"):
+        for function in ast.walk(ast.parse(path.read_text())):
+            waiting = [*ast.iter_child_nodes(function)] if _is_function(function) else []
+            names = set()
+            for node in waiting:
+                if not _is_function(node):
+                    names.add(getattr(node, "id", getattr(node, "arg", None)))
+                    waiting += ast.iter_child_nodes(node)
+            count += name in names
+    return count
+
+
+def _is_function(node: ast.AST) -> bool:
+    return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+
+
 def figures(target: Path) -> dict[str, float]:
     files = sources()
     names = {one.package for one in files if len(one.path.parts) > 1}
@@ -253,6 +272,8 @@ def figures(target: Path) -> dict[str, float]:
             len(re.findall(r"\b(?:Option|Argument|option)\(", path.read_text()))
             for path in SRC.rglob("*.py")
         ),
+        "functions with a value called found": functions_with("found"),
+        "functions with a value called known": functions_with("known"),
         "lines of tests": sum(one.lines for one in sources(ROOT / "tests")),
     }
 

@@ -29,6 +29,8 @@ LIMITS = {
     "long kernels without headings": 0,
     "names at the root": 63,
     "parameters of commands, shared ones once": 126,
+    "functions with a value called found": 225,
+    "functions with a value called known": 142,
     "lines of tests": 71_560,
 }
 
