@@ -11,8 +11,8 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray
+from hybridnav.rooms.cutting import spread
 from hybridnav.rooms.doors import MOST_DOOR_M, RoomBoundaries, measured_clearance_m
-from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
 from research._rooms_truth import FLOORS, Floor
 
 SITES = {
@@ -92,7 +92,7 @@ class Building:
         grown = np.where(self.free, label_of, -1).astype(np.int32)
         region = np.where(self.free, np.int32(0), np.int32(-1))
         steps = round(_BETWEEN_M / self.grid.resolution_m)
-        _segmentation_kernels.grow_labels(grown, region, steps)
+        spread(grown, region, steps)
         return grown
 
     def doors(self, label_of: IntArray) -> FloatArray:

@@ -15,7 +15,7 @@ from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.rooms.find import judged_rooms
 from research._rooms_agreement import compare_rooms
 from research._rooms_buildings import SITES, Building
-from research._rooms_views import names_table, views_table
+from research._rooms_views import cost_table, names_table, views_table
 from research.train_rooms import Training, of_generated
 
 NEAR_M = 1.0
@@ -106,6 +106,7 @@ def measures_table(data: Path, out: Path, n_generated: int = 0) -> None:
         _print("mean of ROSE2's maps", shown, _mean([rows[b.name, shown] for b in given]))
     views_table(buildings, training.without)
     names_table(data)
+    cost_table(data)
 
 
 def _draw(building: Building, drawn: dict[str, IntArray], out: Path) -> None:

@@ -110,17 +110,15 @@ def whole_corridors(building: Building, label_of: IntArray) -> list[bool]:
 
 
 def views_table(buildings: list[Building], judge_of: Callable[[str], Forest]) -> None:
-    """Print which share of the rooms, and of true corridors, each building keeps, and the cost."""
+    """Print which share of the rooms, and of true corridors, each building keeps."""
     print("\n## Rooms that are found again\n")
-    print_head("building", *VIEWS, "corridors whole", "times scipy's transform", "bytes a cell")
+    print_head("building", *VIEWS, "corridors whole")
     shares: dict[str, list[bool]] = {name: [] for name in VIEWS}
     corridors: list[bool] = []
-    costs = []
     for building in buildings:
         forest, grid = judge_of(building.site), building.grid
         cells = np.where(grid.measured == 2, 0.5, grid.measured == 0).astype(np.float32)
-        found, *cost = _measured(grid, forest)
-        costs.append(cost)
+        found = judged_rooms(grid, forest, 1.0)
         row = []
         for name, (least, view) in VIEWS.items():
             seen = view(cells)
@@ -133,31 +131,55 @@ def views_table(buildings: list[Building], judge_of: Callable[[str], Forest]) ->
         corridors += whole
         stayed = [f"{share.mean():.2f}" for share in row]
         of = f"{sum(whole)} of {len(whole)}"
-        print_row(building.name, *stayed, of, f"{cost[0]:.1f}", f"{cost[1]:.0f}")
+        print_row(building.name, *stayed, of)
     every = [f"{np.mean(each):.2f}" for each in shares.values()]
-    ratio, size = np.mean(costs, axis=0)
     of = f"{sum(corridors)} of {len(corridors)}"
-    print_row("all rooms", *every, of, f"{ratio:.1f}", f"{size:.0f}")
+    print_row("all rooms", *every, of)
 
 
-def _measured(grid: hn.OccupancyGrid, forest: Forest) -> tuple[IntArray, float, float]:
-    """Return the rooms, their time over that of scipy's distance transform, bytes a cell."""
+COST_MAPS = (
+    *("bwi_gdc/3/3.yaml", "bwi_gdc/2/2.yaml", "strands/tsc_y4/tsc_1701.yaml"),
+    *("strands/g4s/g4s_y2.yaml", "cob_environments/izs-carpark-top/map.yaml"),
+)
+"""Large maps on which `find_rooms` is timed."""
+
+
+def cost_table(data: Path) -> None:
+    """Print the cost of `find_rooms` against scipy's distance transform in the same process."""
+    print("\n## What finding rooms costs\n")
+    print("CPU time, the least of five runs in turn; memory is the peak that tracemalloc sees.\n")
+    columns = "million cells", "free", "transform, s", "find_rooms, s", "times", "bytes a cell"
+    print_head("map", *columns, "rooms")
+    for name in COST_MAPS:
+        grid = hn.load_map(data / name, robot_radius_m=0)
+        found, edt, own, size = _measured(grid)
+        free = np.mean(grid.measured == hn.CellClass.FREE)
+        cost = f"{edt:.3f}", f"{own:.3f}", f"{own / edt:.2f}", f"{size:.1f}"
+        print_row(
+            *(name, f"{grid.measured.size / 1e6:.2f}", f"{free:.2f}", *cost, len(found.names))
+        )
+
+
+def _measured(grid: hn.OccupancyGrid) -> tuple[hn.RoomLabels, float, float, float]:
+    """Return the rooms, the seconds of scipy's distance transform and of the rooms, and the peak of
+    bytes a cell."""
+    hn.find_rooms(grid)  # compiled before memory is looked at
     tracemalloc.start()
-    found = judged_rooms(grid, forest, 1.0)
-    size = tracemalloc.get_traced_memory()[1] / found.size
+    found = hn.find_rooms(grid)
+    size = tracemalloc.get_traced_memory()[1] / grid.measured.size
     tracemalloc.stop()
-    times = []
-    for run in (
+    runs: tuple[Callable[[], object], ...] = (
         lambda: ndimage.distance_transform_edt(grid.measured != hn.CellClass.OCCUPIED),
-        lambda: judged_rooms(grid, forest, 1.0),
-    ):
-        took = []
-        for _ in range(3):
+        lambda: hn.find_rooms(grid),
+    )
+    took = np.zeros((5, 2))
+    for times in took:
+        for k, run in enumerate(runs):
             began = time.process_time()
             run()
-            took.append(time.process_time() - began)
-        times.append(min(took))
-    return found, times[1] / times[0], size
+            times[k] = time.process_time() - began
+    edt, own = took.min(axis=0).tolist()
+    return found, edt, own, size
 
 
 def names_table(data: Path) -> None:

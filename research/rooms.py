@@ -9,6 +9,7 @@ import itertools
 import sys
 import time
 from argparse import Namespace
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,9 +18,12 @@ import numpy as np
 
 import hybridnav as hn
 from benchmarks.common import NEEDED_DATA, option, print_head, print_row
+from hybridnav.rooms.merging import Forest
 from hybridnav.route import MaxDistanceSearch
+from research._rooms_buildings import SITES, Building
 from research._rooms_measures import measures_table
 from research._rooms_truth import FLOORS, Floor
+from research._rooms_views import cost_table, names_table, views_table
 
 NEAR_M = 1.0
 """How far a passage may lie from a true door."""
@@ -181,16 +185,31 @@ def kind_of(floor: Floor, passage: Passage) -> str:
     return KINDS[1] if rooms in floor.neighbours else KINDS[2]
 
 
+ALONE: dict[str, Callable[[Namespace], None]] = {
+    "cost": lambda given: cost_table(given.data),
+    "names": lambda given: names_table(given.data),
+    "views": lambda given: views_table(
+        [Building.read(given.data, name) for name in given.building or SITES],
+        lambda _: Forest.shipped(),
+    ),
+}
+"""Tables that need no judge of their own, and so no training."""
+
 OPTIONS = [
     NEEDED_DATA,
     option("-o", "--out", default="out/rooms", type=Path),
     option("--no-routes", action="store_true", help="segmentation alone"),
+    option("--only", choices=sorted(ALONE), help="one table, by the judge of the package"),
+    option("--building", action="append", choices=sorted(SITES), help="views of these alone"),
     option("--generated", type=int, default=0, metavar="N", help="judge of N generated floors"),
 ]
 
 
 def main(given: Namespace) -> None:
     """Read the command line and print all tables."""
+    if given.only:
+        ALONE[given.only](given)
+        return
     given.out.mkdir(parents=True, exist_ok=True)
     measures_table(given.data, given.out, given.generated)
     if not given.no_routes:

@@ -19,7 +19,7 @@ import hybridnav as hn
 from benchmarks.common import DATA, Refused, option
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.rooms import merging
-from hybridnav.rooms.cutting import Ground, fine_segments
+from hybridnav.rooms.cutting import Ground, fine_segments, least_cells
 from hybridnav.rooms.find import KINDS, LEAST_LIKELY, SPECK_M2, outside_of
 from hybridnav.rooms.merging import (
     EVIDENCE,
@@ -27,7 +27,6 @@ from hybridnav.rooms.merging import (
     JudgedSegments,
     Likely,
     Small,
-    least_cells,
     merge,
 )
 from research._rooms_boost import Boosting, Examples, averaged, boost

@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_260,
-    "lines": 102_750,
+    "code": 65_440,
+    "lines": 102_950,
     "files": 438,
-    "code outside ext": 50_300,
+    "code outside ext": 50_500,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -51,7 +51,7 @@ BUDGETS = {
     "pyramid": (4445, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
-    "rooms": (5080, 9),
+    "rooms": (5300, 9),
     "route": (1031, 6),
     "search": (12925, 9),
     "topology": (699, 6),

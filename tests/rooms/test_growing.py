@@ -10,14 +10,7 @@ from scipy import ndimage
 import hybridnav as hn
 from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.rooms.cutting import Ground, Kind, closed_by_disc, fine_segments, wall_directions
-from hybridnav.rooms.merging import (
-    EVIDENCE,
-    Forest,
-    JudgedSegments,
-    Likely,
-    Small,
-    merge,
-)
+from hybridnav.rooms.merging import EVIDENCE, Forest, JudgedSegments, Likely, Small, merge
 from tests.rooms.growth import Growth, contract
 from tests.rooms.test_find_rooms import floor
 from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
@@ -182,7 +175,8 @@ def ground_of(free, resolution_m=0.1):
 
 
 def segments_of(free, label_of):
-    return JudgedSegments(label_of.astype(np.int32), ground_of(free))
+    dense = np.unique(np.append(label_of, -1), return_inverse=True)[1][:-1] - 1
+    return JudgedSegments(dense.reshape(free.shape).astype(np.int32), ground_of(free))
 
 
 def evidence_of(free, label_of):

@@ -10,8 +10,6 @@ from hybridnav._base.trig import hypot
 from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.maps.kernels import nearest_distances
 
-_BAND = 256
-"""Rows that are looked at together."""
 _ROUNDING = 1e-9
 """Relative slack on a squared radius, so that 0.25 m is 5 cells of 0.05 m and not 4.999..."""
 
@@ -23,21 +21,33 @@ def within_radius(occupied: BoolArray, *, radius_cells: float) -> BoolArray:
     equal to it counts as within. Result: same shape; by exact Euclidean distances (compared as
     integers).
     """
-    if not occupied.any():
-        return np.zeros_like(occupied)
-    if radius_cells < 1:
+    if radius_cells < 1 or not occupied.any():
         return occupied.copy()
     if radius_cells >= hypot(*occupied.shape):
         return np.ones_like(occupied)
-    squared = math.floor(radius_cells * radius_cells * (1 + _ROUNDING))
-    # In bands of rows, whose distances of eight bytes a cell stay in the processor's cache.
-    reach, within = math.isqrt(squared), np.empty_like(occupied)
-    band = max(_BAND, 4 * reach)
-    for first in range(0, len(occupied), band):
-        low, last = max(first - reach, 0), first + band
-        near = clearance_cells(occupied[low : last + reach]) <= math.sqrt(squared)
-        within[first:last] = near[first - low : last - low]
-    return within
+    return _dilated(occupied, math.floor(radius_cells * radius_cells * (1 + _ROUNDING)))
+
+
+def _dilated(cells: BoolArray, squared: int) -> BoolArray:
+    """Return cells, and those within a squared distance, >= 0, of one: rows are words of 64 bits,
+    the first column in the lowest bit."""
+    packed = np.packbits(cells, axis=1, bitorder="little")
+    wide = np.pad(packed, ((0, 0), (0, -packed.shape[1] % 8))).view("<u8")
+    found, width = np.zeros_like(wide), 0
+    for down in range(min(math.isqrt(squared), len(wide) - 1), -1, -1):
+        reach = math.isqrt(squared - down * down)
+        while width < reach:  # a longer step would go through what lies beyond the last column
+            step = min(reach - width, width + 1, 63)
+            left, right = wide << np.uint64(step), wide >> np.uint64(step)
+            left[:, 1:] |= wide[:, :-1] >> np.uint64(64 - step)
+            right[:, :-1] |= wide[:, 1:] << np.uint64(64 - step)
+            wide |= left
+            wide |= right
+            width += step
+        found[down:] |= wide[: len(wide) - down]
+        found[: len(wide) - down] |= wide[down:]
+    bits = np.unpackbits(found.view(np.uint8), axis=1, count=cells.shape[1], bitorder="little")
+    return bits.view(np.bool_)
 
 
 def clearance_cells(occupied: BoolArray) -> FloatArray:
@@ -55,14 +65,10 @@ def clearance_cells(occupied: BoolArray) -> FloatArray:
 def closing(cells: BoolArray, radius_cells: float) -> BoolArray:
     """Return the morphological closing of cells by a disc, bool of the same shape.
 
-    Distances take as long for a large disc as for a small one.
-
     `cells`: bool (rows, cols); `radius_cells`: radius of the disc, >= 1; a cell belongs to it if
     its centre does.
     """
-    if not cells.any():
-        return cells.copy()
-    margin = int(radius_cells) + 2
-    near = clearance_cells(np.pad(cells, margin)) <= radius_cells
-    closed: BoolArray = clearance_cells(~near) > radius_cells
+    squared = math.floor(radius_cells * radius_cells * (1 + _ROUNDING))
+    margin = math.isqrt(squared) + 1
+    closed = ~_dilated(~_dilated(np.pad(cells, margin), squared), squared)
     return closed[margin:-margin, margin:-margin]

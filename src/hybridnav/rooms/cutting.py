@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy import ndimage
 
 from hybridnav._base.trig import cos, tan
-from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray
-from hybridnav.maps.clearance import clearance_cells, closing
-from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, FloatArray, IntArray
+from hybridnav.maps.clearance import clearance_cells, closing, within_radius
+from hybridnav.rooms.kernels import cutting as _cell_kernels
 
+_ROUNDING = 1e-9
 _CLOSE_M = 0.15
 _CLOSE_RAYS_M = 0.25
 _HOLE_M2 = 0.5
@@ -46,6 +46,12 @@ _FAINT = 0.05
 of the map at least that of the strongest."""
 
 
+def least_cells(least_m2: float, cell_m2: float) -> int:
+    """Return the fewest cells that make an area, so that 2 m2 are 200 cells of a decimetre and not
+    201."""
+    return math.ceil(least_m2 / cell_m2 * (1 - _ROUNDING))
+
+
 class Kind(IntEnum):
     """Kind of a cell for the cut into segments."""
 
@@ -65,8 +71,9 @@ class Ground:
     """bool (rows, cols)."""
     wall: BoolArray
     """bool (rows, cols), rims of obstacles near free cells."""
-    clearance: FloatArray
-    """float64 (rows, cols), in cells; 1 everywhere on a map without obstacles."""
+    squares: IntArray
+    """int32 (rows, cols), those of the clearance of free cells, in cells; 1 on a map without
+    obstacles."""
     resolution_m: float
     """Side of a cell in metres."""
 
@@ -88,46 +95,53 @@ class Ground:
             occupied = occupied | (_rim(free) & (kinds != Kind.OUTSIDE))
         elif unexplored > _RAYS:
             free = closed_by_disc(free, occupied, _CLOSE_RAYS_M / resolution_m)
-            holes, _ = ndimage.label(~free & ~occupied)
-            small = np.bincount(holes.ravel()) * (resolution_m * resolution_m) < _HOLE_M2
-            small[0] = False
-            free = free | small[holes]
+            holes = ~free & ~occupied
+            least = least_cells(_HOLE_M2, resolution_m * resolution_m)
+            free = free | holes & (_cell_kernels.large_parts(holes, least) < 0)
             occupied = occupied | _rim(free)
-        near = clearance_cells(~free) * resolution_m <= _RIM_M
-        clearance = clearance_cells(occupied)
-        clearance[~np.isfinite(clearance)] = 1.0
-        return cls(free, occupied & near, clearance, resolution_m)
+        clearance = clearance_cells(occupied) if occupied.any() else np.ones(free.shape)
+        clearance *= clearance
+        squares = np.rint(clearance, out=clearance).astype(np.int32)
+        depths = np.sqrt(np.arange((_RIM_M / resolution_m + 1) ** 2))
+        depth = depths[depths * resolution_m <= _RIM_M].max()
+        return cls(free, occupied & within_radius(free, radius_cells=depth), squares, resolution_m)
 
 
 def fine_segments(ground: Ground) -> IntArray:
     """Cut free space so finely that hardly any segment lies in two rooms.
 
     `ground`: what counts as free and as wall. Returns int32 (rows, cols), a segment for each free
-    cell, -1 elsewhere and for specks below 0.1 m2 that touch no other free cell.
+    cell, without gaps from 0, -1 elsewhere and for specks below 0.1 m2 that touch no other free
+    cell.
     """
     free = ground.free
-    cut = np.zeros_like(free)
-    for angle_rad, within in wall_directions(ground.wall, ground.resolution_m):
-        _cut_in(ground, angle_rad, within, cut)
-    lines = _large_parts(free & ~cut, ground)
-    everywhere = np.where(free, np.int32(0), np.int32(-1))
-    _segmentation_kernels.grow_labels(lines, everywhere, free.size)
-    whole = _large_parts(free & (lines < 0), ground)  # gaps have taken all of its cells
-    lines = np.where(whole >= 0, whole + lines.max(initial=-1) + 1, lines)
-    basins = _basins(ground)
-    inside = (lines >= 0) & (basins >= 0)
-    both = lines[inside] * (np.int64(basins.max(initial=0)) + 1) + basins[inside]
-    segments = np.full(free.shape, -1, dtype=np.int32)
-    segments[inside] = np.unique(both, return_inverse=True)[1]
-    return segments
+    least = least_cells(_LEAST_M2, ground.resolution_m * ground.resolution_m)
+    lines: IntArray = _cell_kernels.large_parts(free & ~_gaps(ground), least)
+    spread(lines, free.view(np.int8) - np.int8(1), free.size)
+    taken = free & (lines < 0)
+    if taken.any():  # gaps have taken all cells
+        whole = _cell_kernels.large_parts(taken, least)
+        whole[whole >= 0] += lines.max() + np.int32(1)
+        np.maximum(lines, whole, out=lines)
+        del whole
+    broad = _PASSAGE_M / ground.resolution_m
+    basins = _cell_kernels.flood_basins(ground.squares, free, _PASSAGE, broad)
+    _cell_kernels.cross(lines, basins)
+    return lines
 
 
-def _large_parts(mask: BoolArray, ground: Ground) -> IntArray:
-    """Number the connected parts of a mask that are no specks, int32 (rows, cols), -1 elsewhere."""
-    parts, _ = ndimage.label(mask)
-    kept = np.bincount(parts.ravel()) * (ground.resolution_m * ground.resolution_m) >= _LEAST_M2
-    kept[0] = False
-    return np.where(kept[parts], parts - 1, -1).astype(np.int32)
+def spread(label_of: IntArray, region: AnyArray, most_steps: int) -> None:
+    """Spread labels by steps along sides, each cell taking the nearest, in place.
+
+    Steps go only between cells of one region, none into region -1, and at most `most_steps` from
+    where a label begins. `label_of`, `region`: int32 (rows, cols), the second int8 as well.
+    """
+    to_label = (label_of < 0) & (region >= 0)
+    beside = within_radius(to_label, radius_cells=1.0) & (label_of >= 0)
+    first = np.flatnonzero(beside)
+    queue = np.empty(len(first) + np.count_nonzero(to_label), np.int64)
+    queue[: len(first)] = first
+    _cell_kernels.grow_labels(label_of, region, queue, len(first), most_steps)
 
 
 def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, BoolArray]]:
@@ -142,10 +156,13 @@ def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, B
     """
     side = max(8, round(_WINDOW_M / resolution_m))
     votes: list[tuple[float, float, int, int]] = []
+    rows, cols = np.divmod(np.flatnonzero(wall), wall.shape[1])
     for row in range(0, max(1, wall.shape[0] - side // 2), side // 2):
+        begin, end = np.searchsorted(rows, (row, row + side))
         for col in range(0, max(1, wall.shape[1] - side // 2), side // 2):
-            inside = wall[row : row + side, col : col + side]
-            votes += [(a, s, row, col) for a, s in _directions_of(inside, side, resolution_m)]
+            near = begin + np.flatnonzero((cols[begin:end] >= col) & (cols[begin:end] < col + side))
+            cells = np.stack([rows[near] - row, cols[near] - col]) - side / 2
+            votes += [(a, s, row, col) for a, s in _directions_of(cells, resolution_m)]
     found: list[tuple[float, BoolArray]] = []
     strongest = 0.0
     while votes and len(found) < _MOST_DIRECTIONS:
@@ -167,15 +184,16 @@ def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, B
     return found
 
 
-def _directions_of(wall: BoolArray, side: int, resolution_m: float) -> list[tuple[float, float]]:
-    """Find up to two directions of one window, with how far their sharpness exceeds the median."""
-    cells = np.argwhere(wall) - side / 2
-    if len(cells) * resolution_m < _LEAST_WALL_CELLS_M:
+def _directions_of(cells: FloatArray, resolution_m: float) -> list[tuple[float, float]]:
+    """Find up to two directions of the walls of one window, with how far their sharpness exceeds
+    the median. `cells`: float64 (2, n), rows and columns from its middle."""
+    n = cells.shape[1]
+    if n * resolution_m < _LEAST_WALL_CELLS_M:
         return []
-    cells = cells[np.linspace(0, len(cells) - 1, min(len(cells), _MOST_POINTS)).astype(int)]
-    rows, cols = np.ascontiguousarray(cells.T)
+    kept = np.linspace(0, n - 1, min(n, _MOST_POINTS)).astype(int)
+    rows, cols = np.ascontiguousarray(cells[:, kept])
     coarse = np.radians(np.arange(-45.0, 45.0))
-    sharp = _segmentation_kernels.sharpness(rows, cols, coarse)
+    sharp = _cell_kernels.sharpness(rows, cols, coarse)
     median, order = float(np.median(sharp)), np.argsort(-sharp, kind="stable")
     found: list[tuple[float, float]] = []
     for k in order.tolist():
@@ -183,7 +201,7 @@ def _directions_of(wall: BoolArray, side: int, resolution_m: float) -> list[tupl
             break
         if all(_apart(coarse[k], angle) >= _APART_RAD for angle, _ in found):
             fine = coarse[k] + np.radians(np.arange(-1.0, 1.01, 0.25))
-            near = _segmentation_kernels.sharpness(rows, cols, fine)
+            near = _cell_kernels.sharpness(rows, cols, fine)
             found.append((float(fine[near.argmax()]), float(near.max()) - median))
     return found
 
@@ -197,35 +215,30 @@ def _apart(angle_rad: FloatArray, other_rad: float) -> FloatArray:
     return np.abs(_wrapped(angle_rad - other_rad))
 
 
-def _cut_in(ground: Ground, angle_rad: float, within: BoolArray, cut: BoolArray) -> None:
-    """Add the gaps between walls on lines in a direction, and square to it."""
-    slack = max(1, round(_SLACK_M / ground.resolution_m))
-    along = cos(angle_rad) / ground.resolution_m
-    lengths = _segmentation_kernels.GapLengths(
-        *(max(1, round(length_m * along)) for length_m in _LENGTHS_M)
-    )
+def _gaps(ground: Ground) -> BoolArray:
+    """Return the cells of gaps between walls, on lines in each direction of walls, and square to
+    it."""
+    cut = np.zeros_like(ground.free)
+    directions = wall_directions(ground.wall, ground.resolution_m)
     for turned in (False, True):
-        wall, free, inside, out = (
-            np.ascontiguousarray(mask.T if turned else mask)
-            for mask in (ground.wall, ground.free, within, np.zeros_like(cut))
+        wall, free, found, *windows = (
+            _cell_kernels.transposed(mask) if turned else mask
+            for mask in (ground.wall, ground.free, cut, *(within for _, within in directions))
         )
-        slope = -tan(angle_rad) if turned else tan(angle_rad)
-        size = 2 * slack + 1
-        wall = ndimage.maximum_filter1d(wall.view(np.uint8), size, 0, mode="constant") > 0
-        _segmentation_kernels.cut_along(wall, free, slope, inside, lengths, _FREE_SHARE, out)
-        cut |= out.T if turned else out
-
-
-def _basins(ground: Ground) -> IntArray:
-    """Find the basins of the clearance, parted at narrow passages."""
-    clearance = np.pad(ground.clearance, 1)
-    inside = np.flatnonzero(np.pad(ground.free, 1))
-    flat = clearance.ravel()
-    order = inside[np.argsort(-flat[inside], kind="stable")]
-    basins: IntArray = _segmentation_kernels.flood_basins(
-        flat, order, clearance.shape[1], _PASSAGE, _PASSAGE_M / ground.resolution_m
-    )
-    return basins.reshape(clearance.shape)[1:-1, 1:-1]
+        thick = wall.copy()
+        for away in range(1, max(1, round(_SLACK_M / ground.resolution_m)) + 1):
+            thick[away:] |= wall[:-away]
+            thick[:-away] |= wall[away:]
+        for (angle_rad, _), within in zip(directions, windows, strict=True):
+            along = cos(angle_rad) / ground.resolution_m
+            lengths = _cell_kernels.GapLengths(
+                *(max(1, round(length_m * along)) for length_m in _LENGTHS_M)
+            )
+            slope = -tan(angle_rad) if turned else tan(angle_rad)
+            _cell_kernels.cut_along(thick, free, slope, within, lengths, _FREE_SHARE, found)
+        if turned:
+            cut |= _cell_kernels.transposed(found)
+    return cut
 
 
 def closed_by_disc(free: BoolArray, occupied: BoolArray, reach: float) -> BoolArray:
@@ -234,5 +247,10 @@ def closed_by_disc(free: BoolArray, occupied: BoolArray, reach: float) -> BoolAr
     return closing(free, math.sqrt(size * size + 1)) & ~occupied
 
 
+def with_beside(cells: BoolArray) -> BoolArray:
+    """Return cells, and the eight round each."""
+    return within_radius(cells, radius_cells=1.5)
+
+
 def _rim(free: BoolArray) -> BoolArray:
-    return ndimage.binary_dilation(free, np.ones((3, 3), dtype=np.bool_)) & ~free
+    return with_beside(free) & ~free

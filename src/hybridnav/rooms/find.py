@@ -5,18 +5,19 @@ map, or anew in a part of it beside rooms that stay.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
 
-from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_mask
 from hybridnav.maps.orientation import Orientation
 from hybridnav.maps.room_labels import MAX_ROOMS
-from hybridnav.rooms.cutting import Ground, Kind, fine_segments
-from hybridnav.rooms.kernels import segmentation as _segmentation_kernels
+from hybridnav.rooms.cutting import Ground, Kind, fine_segments, least_cells, spread
+from hybridnav.rooms.kernels import cutting as _cell_kernels
 from hybridnav.rooms.merging import (
     Forest,
     Judge,
@@ -25,7 +26,6 @@ from hybridnav.rooms.merging import (
     Rule,
     Small,
     grown,
-    least_cells,
     merge,
 )
 
@@ -113,7 +113,7 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
     divided = np.full(room_of.shape, NO_ROOM, dtype=np.int32)
     for label, cell in seeds.items():
         divided[cell] = label
-    _segmentation_kernels.grow_labels(divided, room_of, room_of.size)
+    spread(divided, room_of, room_of.size)
     return divided
 
 
@@ -129,20 +129,26 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     free = (grid.measured == CellClass.FREE) & ~outside_of(grid)
     if not free.any():
         return np.full(grid.shape, NO_ROOM, dtype=np.int32)
+    top, bottom, left, right = box_of_mask(grid.measured != CellClass.UNEXPLORED)
+    known = np.s_[top:bottom, left:right]
     margin = int(WALL_REACH_M / grid.resolution_m) + 1
-    kinds = np.pad(KINDS[grid.measured] + free, margin)
-    found = np.full(kinds.shape, NO_ROOM, dtype=np.int32)
-    top, bottom, left, right = box_of_mask(kinds != Kind.UNKNOWN)
-    known = np.s_[top - margin : bottom + margin, left - margin : right + margin]
-    image = Orientation.of(kinds[known])
-    kinds = np.ascontiguousarray(image.turned(kinds[known]).T)  # the longer extent along columns
-    ground = Ground.of(kinds, grid.resolution_m)
-    segments = JudgedSegments(fine_segments(ground), ground)
-    least = least_cells(least_area_m2, grid.cell_area_m2)
+    kinds = np.pad(KINDS[grid.measured[known]] + free[known], margin)
+    image = Orientation.of(kinds)
+    image = replace(image, swaps=1 - image.swaps, flips=image.flips[::-1])  # longer along columns
+    segments = _segments(image.turned(kinds), grid.resolution_m)
     merge(segments, _rules(forest.judge, least_area_m2, grid.cell_area_m2))
-    found[known] = image.turned_back(segments.label_of.T)
-    labels = np.where(free, found[margin:-margin, margin:-margin], np.int32(NO_ROOM))
-    return _in_reading_order(labels, least)
+    found = image.turned_back(segments.label_of)[margin:-margin, margin:-margin]
+    labels = np.full(grid.shape, NO_ROOM, dtype=np.int32)
+    np.copyto(labels[known], found, where=free[known])
+    least = least_cells(least_area_m2, grid.cell_area_m2)
+    _cell_kernels.number_from_above(labels, least)
+    return labels
+
+
+def _segments(kinds: ByteArray, resolution_m: float) -> JudgedSegments:
+    """Return the fine segments of some cells; what they are cut with is forgotten."""
+    ground = Ground.of(kinds, resolution_m)
+    return JudgedSegments(fine_segments(ground), ground)
 
 
 def _rules(judge: Judge, least_area_m2: float, cell_m2: float) -> list[Rule]:
@@ -159,14 +165,10 @@ def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     spread through it into unexplored cells, or into free cells without a room.
     """
     reach = WALL_REACH_M / grid.resolution_m
-    wall = grid.measured == CellClass.OCCUPIED
-    into_walls = grown(label_of, reach)
     inside = label_of.copy()
     entered = (label_of >= 0) | (grid.measured == CellClass.UNEXPLORED)
-    _segmentation_kernels.grow_labels(
-        inside, np.where(entered, np.int32(0), np.int32(-1)), int(reach)
-    )
-    return np.where(wall, into_walls, inside)
+    spread(inside, entered.view(np.int8) - np.int8(1), int(reach))
+    return grown(label_of, reach, into=(inside, grid.measured == CellClass.OCCUPIED))
 
 
 def outside_of(grid: OccupancyGrid) -> BoolArray:
@@ -181,7 +183,7 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     known = np.s_[top:bottom, left:right]
     found = np.zeros(grid.shape, dtype=np.bool_)
     free = grid.measured[known] == CellClass.FREE
-    n_rim = sum(np.count_nonzero(free[side]) for side in _SIDES) if free.any() else 0
+    n_rim = sum(np.count_nonzero(free[side]) for side in _SIDES) if free.size else 0
     if n_rim < max(1, sum(free.shape)):
         return found  # most maps: their border is unexplored
     part_of, n_parts = ndimage.label(free)
@@ -190,27 +192,13 @@ def outside_of(grid: OccupancyGrid) -> BoolArray:
     n_border = sum(len(border) for border in borders)
     around = np.all(np.stack(on_border) > 0, axis=0) & (2 * sum(on_border) >= n_border)
     around[0] = False
+    if not around.any():
+        return found
     areas = np.bincount(part_of.ravel(), minlength=n_parts + 1)
     inside = areas[1:][~np.any(np.stack(on_border) > 0, axis=0)[1:]].sum()
     around &= inside >= _LEAST_INSIDE * areas
     found[known] = around[part_of]
     return found
-
-
-def _in_reading_order(label_of: IntArray, least: int) -> IntArray:
-    """Return labels of at least some cells, renumbered by their first cells from the top row
-    down."""
-    areas = np.bincount(label_of[label_of >= 0])
-    upside_down = label_of[::-1].ravel()
-    cells = np.flatnonzero(upside_down >= 0)[::-1]
-    firsts = np.empty(len(areas), dtype=np.int64)
-    firsts[upside_down[cells]] = cells  # the last one that is written stays: the first cell
-    found = np.flatnonzero(areas)
-    first, large = firsts[found], areas[found] >= least
-    order = found[large][np.argsort(first[large], kind="stable")]
-    new = np.full(len(areas) + 1, NO_ROOM, dtype=np.int32)
-    new[order] = np.arange(len(order))
-    return new[label_of]
 
 
 LEFT_OUT = -2
@@ -299,7 +287,8 @@ def renewed_rooms(
     label_of[cut] = first + fine[cut]
     if not cut.any():
         return np.full(room_of.shape, NO_ROOM, np.int32)
-    segments = JudgedSegments(label_of, ground)
+    _, dense = np.unique(np.append(label_of, NO_ROOM), return_inverse=True)
+    segments = JudgedSegments(dense[:-1].reshape(label_of.shape).astype(np.int32) - 1, ground)
     # The numbers of rooms that stay lie below all others, and segments keep the order.
     stays = np.arange(len(np.unique(room_of[room_of >= 0])))
     rules = _rules(_Lasting(segments, before).judge, least_area_m2, grid.cell_area_m2)

@@ -11,35 +11,39 @@ from itertools import chain
 from typing import Protocol
 
 import numpy as np
-from scipy import ndimage
 
-from hybridnav._base.typing import FloatArray, IntArray, LongArray
-from hybridnav.rooms.cutting import Ground
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+from hybridnav.maps.clearance import within_radius
+from hybridnav.rooms.cutting import Ground, with_beside
+from hybridnav.rooms.kernels import cutting as _cell_kernels
 from hybridnav.rooms.kernels import merging as _merging_kernels
-from hybridnav.rooms.kernels import segmentation as _evidence_kernels
 from hybridnav.rooms.kernels.merging import SegmentState
 
 Judge = Callable[[LongArray, FloatArray], FloatArray]
 """Returns the probability that both segments of each pair belong to one room, float64 (n,), by
 their evidence, float64 (n, len(EVIDENCE))."""
 
-_ROUNDING = 1e-9
 
-
-def least_cells(least_m2: float, cell_m2: float) -> int:
-    """Return the fewest cells that make an area, so that 2 m2 are 200 cells of a decimetre and not
-    201."""
-    return math.ceil(least_m2 / cell_m2 * (1 - _ROUNDING))
-
-
-def grown(label_of: IntArray, reach_cells: float) -> IntArray:
+def grown(
+    label_of: IntArray, reach_cells: float, *, into: tuple[IntArray, BoolArray] | None = None
+) -> IntArray:
     """Return labels spread to the unlabelled cells within reach, walls or not: each takes the
-    nearest one."""
-    if (label_of < 0).all():
-        return label_of.copy()
-    distance, nearest = ndimage.distance_transform_edt(label_of < 0, return_indices=True)
-    spread: IntArray = np.where(distance <= reach_cells, label_of[tuple(nearest)], -1)
-    return spread.astype(np.int32)
+    nearest one.
+
+    `into`: labels that are changed in place instead, int32, and the only cells that are,
+    bool, both (rows, cols).
+    """
+    side = int(reach_cells)
+    row, col = np.mgrid[-side : side + 1, -side : side + 1].reshape(2, -1)
+    squares = row * row + col * col
+    order = np.lexsort((row, col, squares))
+    order = order[np.sqrt(squares[order]) <= reach_cells]
+    found, wanted = (label_of.copy(), label_of < 0) if into is None else into
+    radius = math.sqrt(squares[order[-1]])
+    wanted = wanted & within_radius(label_of >= 0, radius_cells=radius)
+    offsets = np.stack([row[order], col[order]], axis=1)
+    _cell_kernels.take_nearest(label_of, wanted, offsets, found)
+    return found
 
 
 EVIDENCE = (
@@ -90,7 +94,7 @@ class Forest:
 
     def judge(self, _pairs: LongArray, evidence: FloatArray) -> FloatArray:
         """Return the probability that two segments belong to one room, float64 (n,)."""
-        return _evidence_kernels.probabilities(
+        return _merging_kernels.probabilities(
             evidence, self.features, self.thresholds, self.leaves, self.base
         )
 
@@ -98,15 +102,13 @@ class Forest:
 class JudgedSegments:
     """Segments of free space, with the evidence on their boundaries; merging keeps it up to date.
 
-    `label_of`: int32 (rows, cols), a segment for each free cell, -1 elsewhere; `ground`: what
-    counts as free and as wall.
+    `label_of`: int32 (rows, cols), a segment for each free cell, without gaps from 0, -1 elsewhere;
+    `ground`: what counts as free and as wall.
     """
 
     def __init__(self, label_of: IntArray, ground: Ground) -> None:
-        is_used = np.bincount(label_of[label_of >= 0]) > 0
-        dense = np.append(np.cumsum(is_used) - 1, -1)  # sorting all cells would take longer
-        self._label_of: IntArray = dense[np.maximum(label_of, -1)].astype(np.int32)
-        self.n_segments = int(np.count_nonzero(is_used))
+        self._label_of = label_of
+        self.n_segments = int(label_of.max(initial=-1)) + 1
         self._resolution_m = ground.resolution_m
         self.state = _state(self._label_of, self.n_segments, ground)
         self.owner_of = np.arange(self.n_segments)
@@ -115,12 +117,12 @@ class JudgedSegments:
     @property
     def label_of(self) -> IntArray:
         """int32 (rows, cols), the segments as they are now; numbers have gaps."""
-        return np.append(self.owner_of, -1)[self._label_of].astype(np.int32)
+        return np.append(self.owner_of, -1).astype(np.int32)[self._label_of]
 
     def evidence(self, pairs: LongArray) -> FloatArray:
         """Return the evidence on pairs with an open border, float64 (n, len(EVIDENCE))."""
         found = np.zeros((len(pairs), len(EVIDENCE)))
-        _evidence_kernels.fill_evidence(
+        _merging_kernels.fill_evidence(
             self.state,
             pairs,
             self._resolution_m,
@@ -147,12 +149,12 @@ class JudgedSegments:
 def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
     """Measure segments and the pairs that touch."""
     reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
-    measured = _merging_kernels.measure_segments(label_of, reaching, ground.clearance, n)
+    measured = _merging_kernels.measure_segments(label_of, reaching, ground.squares, n)
     shapes = _merging_kernels.SegmentShapes(*chain(*measured))
-    pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.clearance)
+    pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.squares)
     order, opened, run_begins, run_ends = _runs(pairs, n)
     _, border, border_begins, border_ends = _runs(
-        _merging_kernels.sides_between(reaching, ground.clearance)[0], n
+        _merging_kernels.sides_between(reaching, ground.squares)[0], n
     )
     keys = np.union1d(opened, border)
     at, count = np.searchsorted(keys, opened), len(keys)
@@ -185,7 +187,7 @@ def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
         run_begins=begin,
         run_ends=end,
         sides=sides[order],
-        wall=ndimage.binary_dilation(ground.wall, np.ones((3, 3), dtype=np.bool_)),
+        wall=with_beside(ground.wall),
         hulls_used=np.array([len(shapes.hulls)]),
         mark=np.full(n, -1),
     )

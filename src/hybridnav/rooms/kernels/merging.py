@@ -1,4 +1,5 @@
-"""Kernels of segments of free space: their shapes, the sides between them, merging."""
+"""Kernels of segments of free space: their shapes, the sides between them, merging, the evidence on
+a boundary between two and the forest that judges it."""
 
 import math
 from typing import NamedTuple
@@ -6,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.trig import atan2, cos, exp, hypot, sin
 
 
 class SegmentState(NamedTuple):
@@ -143,9 +145,9 @@ class SegmentShapes(NamedTuple):
 
 @guarded
 @njit(cache=True, nogil=True)
-def measure_segments(label_of, reaching, clearance, n):
+def measure_segments(label_of, reaching, squares, n):
     """Measure free cells, peaks, moments and rims of segments, and their hulls one after the
-    other."""
+    other. `squares`: int32, those of the clearance in cells."""
     rows, cols = label_of.shape
 
     # Areas and clearance are those of free cells. Shape and rim include the reach into walls, so
@@ -154,31 +156,40 @@ def measure_segments(label_of, reaching, clearance, n):
     moments = np.zeros((n, 6))
     low, high = np.full(n, rows), np.full(n, -1)
     for row in range(rows):
-        for col in range(cols):
-            u = label_of[row, col]
-            if u >= 0:
-                free[u] += 1
-                peaks[u] = max(peaks[u], clearance[row, col])
-            u = reaching[row, col]
+        end = 0
+        while end < cols:  # a run of cells of one segment
+            begin, u = end, reaching[row, end]
+            n_free, top = 0, np.int32(0)
+            while end < cols and reaching[row, end] == u:
+                if label_of[row, end] >= 0:
+                    n_free, top = n_free + 1, max(top, squares[row, end])
+                end += 1
             if u < 0:
                 continue
+            free[u] += n_free
+            peaks[u] = max(peaks[u], top)
+            low[u], high[u] = min(low[u], row), row
 
             # Sums, not means: when two segments merge, theirs add up.
+            count, along = end - begin, (end - begin) * (begin + end - 1) // 2
             at = moments[u]
-            at[0] += 1
-            at[1] += row
-            at[2] += col
-            at[3] += row * row
-            at[4] += row * col
-            at[5] += col * col
-            low[u] = min(low[u], row)
-            high[u] = row
+            at[0] += count
+            at[1] += row * count
+            at[2] += along
+            at[3] += row * row * count
+            at[4] += row * along
+            at[5] += ((end - 1) * end * (2 * end - 1) - (begin - 1) * begin * (2 * begin - 1)) // 6
 
             # A side counts where another segment, no segment or the end of the map is beyond it.
-            for step in ((0, 1), (1, 0), (0, -1), (-1, 0)):
-                r, c = row + step[0], col + step[1]
-                if not (0 <= r < rows and 0 <= c < cols) or reaching[r, c] != u:
-                    rims[u] += 1
+            rims[u] += 2
+            for other in (row - 1, row + 1):
+                if not 0 <= other < rows:
+                    rims[u] += count
+                    continue
+                n_sides = 0
+                for col in range(begin, end):
+                    n_sides += reaching[other, col] != u
+                rims[u] += n_sides
 
     # Only the first and the last cell of a segment in a row can be on its hull: one place for each
     # row.
@@ -187,12 +198,17 @@ def measure_segments(label_of, reaching, clearance, n):
         begins[u + 1] = begins[u] + max(0, high[u] - low[u] + 1)
     left, right = np.full(begins[n], cols), np.full(begins[n], -1)
     for row in range(rows):
+        before = -1
         for col in range(cols):
             u = reaching[row, col]
-            if u >= 0:
+            if u != before and u >= 0:
                 k = begins[u] + row - low[u]
                 left[k] = min(left[k], col)
-                right[k] = col
+            if u != before and before >= 0:
+                right[begins[before] + row - low[before]] = col - 1
+            before = u
+        if before >= 0:
+            right[begins[before] + row - low[before]] = cols - 1
 
     # A hull has at most as many corners as points go in, four a row.
     hulls = np.empty((4 * begins[n] + 16, 2))
@@ -220,12 +236,16 @@ def measure_segments(label_of, reaching, clearance, n):
         hull_begins[u] = used
         used += sizes[u]
         diameters[u] = diameter_of(corners, sizes[u])
-    return (free, moments, rims, peaks), (hull_begins, sizes), (areas, diameters, hulls[:used])
+    return (
+        (free, moments, rims, np.sqrt(peaks)),
+        (hull_begins, sizes),
+        (areas, diameters, hulls[:used]),
+    )
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def sides_between(label_of, clearance):
+def sides_between(label_of, squares):
     """Find sides between cells of two segments: both segments, middle and direction, clearance."""
     rows, cols = label_of.shape
     n = 0
@@ -247,7 +267,7 @@ def sides_between(label_of, clearance):
                     if fill:
                         pairs[n] = min(u, label_of[r, c]), max(u, label_of[r, c])
                         sides[n] = (row + r) / 2 + 0.5, (col + c) / 2 + 0.5, float(k)
-                        clear[n] = min(clearance[row, col], clearance[r, c])
+                        clear[n] = math.sqrt(min(squares[row, col], squares[r, c]))
                     n += 1
     return pairs, sides, clear
 
@@ -351,7 +371,7 @@ def pairs_of_both(state, segment):
     return pairs_of(state, segment)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, _nrt=False)
 def join_pairs(state, kept, gone):
     """Add the sides of one pair to another one between the same segments."""
     state.border_sides[kept] += state.border_sides[gone]
@@ -365,3 +385,215 @@ def join_pairs(state, kept, gone):
     state.open_sides[kept] += state.open_sides[gone]
     state.widest[kept] = max(state.widest[kept], state.widest[gone])
     state.clearances[kept] += state.clearances[gone]
+
+
+@njit(cache=True, nogil=True)
+def is_wall(wall, row, col):
+    """Return whether a point in cells lies in a wall."""
+    r, c = math.floor(row), math.floor(col)
+    return 0 <= r < wall.shape[0] and 0 <= c < wall.shape[1] and wall[r, c]
+
+
+@njit(cache=True, nogil=True)
+def flush(wall, end, outward, across, reach):
+    """Return the share of an arm, square to an opening at its end, that runs on a wall.
+
+    The arm has 3/4 of the reach."""
+    arm, skip, deep = (3 * reach) // 4, max(1, reach // 7), max(2, reach // 7)
+    met = 0
+    for k in range(skip, arm + 1):
+        for out in range(-2, deep + 1):
+            row = end[0] + outward[0] * out + across[0] * k
+            if is_wall(wall, row, end[1] + outward[1] * out + across[1] * k):
+                met += 1
+                break
+    return met / (arm + 1 - skip)
+
+
+@njit(cache=True, nogil=True)
+def opening_of(state, pair, reach, found):
+    """Fill `found` with what the open sides of a pair look like along their main axis.
+
+    Span, deviation, sides along the axis, lower and higher jamb, share of wall inside, direction,
+    longest run, lower, higher and mean share of walls that run on square to it.
+    """
+    # First and second moments of the middles of the sides; how many lie along the columns.
+    wall = state.wall
+    n, upright = 0, 0.0
+    row = col = rr = rc = cc = 0.0
+    run = state.head[pair]
+    while run >= 0:
+        for i in range(state.run_begins[run], state.run_ends[run]):
+            x, y = state.sides[i, 0], state.sides[i, 1]
+            n += 1
+            upright += state.sides[i, 2]
+            row, col, rr, rc, cc = row + x, col + y, rr + x * x, rc + x * y, cc + y * y
+        run = state.next_run[run]
+    row, col = row / n, col / n
+    rr, rc, cc = rr / n - row * row, rc / n - row * col, cc / n - col * col
+
+    # Eigenvalues of the covariance: the spread along and across the main axis, whose direction is
+    # the eigenvector of the greater one.
+    half = math.sqrt(max(0.0, (rr - cc) ** 2 / 4 + rc * rc))
+    major, minor = (rr + cc) / 2 + half, max(0.0, (rr + cc) / 2 - half)
+    by_row, by_col = rc, major - rr
+    norm = hypot(by_row, by_col)
+
+    # Few or close sides have no clear main axis: the direction of most decides. The vector vanishes
+    # where the axis is that of the rows.
+    if n < 3 or major < 0.3:
+        by_row, by_col, norm = (0.0, 1.0, 1.0) if 2 * upright >= n else (1.0, 0.0, 1.0)
+    elif norm < 1e-9:
+        by_row, by_col, norm = (1.0, 0.0, 1.0) if rr >= cc else (0.0, 1.0, 1.0)
+    by_row, by_col = by_row / norm, by_col / norm
+
+    # From end to end along the axis; a side is one cell long, hence the one added.
+    low, high = np.inf, -np.inf
+    run = state.head[pair]
+    while run >= 0:
+        for i in range(state.run_begins[run], state.run_ends[run]):
+            at = (state.sides[i, 0] - row) * by_row + (state.sides[i, 1] - col) * by_col
+            low, high = min(low, at), max(high, at)
+        run = state.next_run[run]
+    span = high - low + 1.0
+
+    # Sides in the same place along the axis count once: a ragged border is no wider opening.
+    covered = np.zeros(int(span) + 2, np.bool_)
+    run = state.head[pair]
+    while run >= 0:
+        for i in range(state.run_begins[run], state.run_ends[run]):
+            at = (state.sides[i, 0] - row) * by_row + (state.sides[i, 1] - col) * by_col
+            covered[int(at - low)] = True
+        run = state.next_run[run]
+
+    # Wall in line with the opening: beyond both ends, as beside a door, and between them.
+    before = behind = inside = 0
+    for k in range(1, reach + 1):
+        before += is_wall(wall, row + by_row * (low - k), col + by_col * (low - k))
+        behind += is_wall(wall, row + by_row * (high + k), col + by_col * (high + k))
+    for k in range(int(span)):
+        at = low + k + 0.5
+        inside += is_wall(wall, row + by_row * at, col + by_col * at)
+
+    # Runs of covered places are the openings of which the border consists.
+    total = runs = longest = length = 0
+    for k in range(len(covered)):
+        length = length + 1 if covered[k] else 0
+        total += covered[k]
+        runs += length == 1
+        longest = max(longest, length)
+
+    # Walls that run on square to the opening, by end and hand. A hand is flush only where both ends
+    # have such a wall: the lesser arm counts.
+    arms = np.empty((2, 2))
+    for end in range(2):
+        at, sign = (low, -1.0) if end == 0 else (high, 1.0)
+        point = (row + by_row * at, col + by_col * at)
+        out = (sign * by_row, sign * by_col)
+        arms[end, 0] = flush(wall, point, out, (-by_col, by_row), reach)
+        arms[end, 1] = flush(wall, point, out, (by_col, -by_row), reach)
+    one, other = min(arms[0, 0], arms[1, 0]), min(arms[0, 1], arms[1, 1])
+    found[0], found[1], found[2] = span, math.sqrt(minor), total
+    found[3], found[4] = min(before, behind) / reach, max(before, behind) / reach
+    found[5] = inside / max(1, int(span))
+    found[6], found[7], found[8], found[9] = by_row, by_col, runs, longest
+    found[10], found[11], found[12] = min(one, other), max(one, other), arms.mean()
+
+
+@njit(cache=True, nogil=True)
+def axes_of(moments):
+    """Return the elongation of cells, and the angle of their main axis from the rows."""
+    n = moments[0]
+    row, col = moments[1] / n, moments[2] / n
+    rr, rc = moments[3] / n - row * row, moments[4] / n - row * col
+    cc = moments[5] / n - col * col
+    half = math.sqrt(max(0.0, (rr - cc) ** 2 / 4 + rc * rc))
+    major, minor = max(0.08, (rr + cc) / 2 + half), max(0.08, (rr + cc) / 2 - half)
+    return math.sqrt(major / minor), 0.5 * atan2(2 * rc, rr - cc)
+
+
+@njit(cache=True, nogil=True)
+def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
+    """Fill the evidence of each pair, in the order of `EVIDENCE`, the smaller segment first."""
+    found = np.empty(13)
+    for k in range(len(pairs)):
+        pair, row = pairs[k], evidence[k]
+        u, v = state.endpoints[pair, 0], state.endpoints[pair, 1]
+
+        # By size, as `EVIDENCE` asks: the numbers of segments must not change a judgement.
+        if state.free[u] > state.free[v]:
+            u, v = v, u
+        opening_of(state, pair, jamb, found)
+
+        # The border with the reach into walls, but at least the open sides: their share is at most
+        # 1.
+        n, border = state.open_sides[pair], max(state.border_sides[pair], state.open_sides[pair])
+        _corners, _size, hull_area = union_hull(state, u, v)
+
+        # Two parts of one convex room fill the hull of both.
+        area_u, area_v = state.moments[u, 0], state.moments[v, 0]
+        solid_u, solid_v = area_u / state.hull_areas[u], area_v / state.hull_areas[v]
+        solid = (area_u + area_v) / hull_area
+        long_u, axis_u = axes_of(state.moments[u])
+        long_v, axis_v = axes_of(state.moments[v])
+        long_both, _ = axes_of(state.moments[u] + state.moments[v])
+
+        # Mean breadth: the area over the greatest length, without the reach into both walls.
+        broad_u = max(1.0, area_u / max(1.0, state.diameters[u]) - 2 * reach)
+        broad_v = max(1.0, area_v / max(1.0, state.diameters[v]) - 2 * reach)
+        rim_u, rim_v = state.rims[u], state.rims[v]
+        rim = max(1.0, rim_u + rim_v - 2 * border)
+        widest, peak_u, peak_v = state.widest[pair], state.peaks[u], state.peaks[v]
+        width, axis = found[2], atan2(found[7], found[6])
+
+        # The opening. Lengths are in metres, so that maps of all resolutions share one forest.
+        row[0], row[1], row[2] = width * resolution, found[0] * resolution, width / found[0]
+        row[3], row[4] = found[1] * resolution, found[1] / found[0]
+        row[5], row[6], row[7] = found[3], found[4], found[5]
+
+        # Clearance on it, and against the clearest cells of both segments: a door is narrow for
+        # both.
+        row[8], row[9] = widest * resolution, state.clearances[pair] / n * resolution
+        row[10] = widest / max(1.0, min(peak_u, peak_v))
+        row[11] = widest / max(1.0, peak_u, peak_v)
+
+        # How much of the border and of each rim it takes; how open both are now, and as one.
+        row[12], row[13], row[14] = n / border, n / rim_u, n / rim_v
+        row[15], row[16] = min(1.0, state.opened[u] / rim_u), min(1.0, state.opened[v] / rim_v)
+        row[17] = min(1.0, (state.opened[u] + state.opened[v] - 2 * n) / rim)
+
+        # How convex both are, and what merging gains over their mean by area.
+        row[18], row[19], row[20] = solid_u, solid_v, solid
+        row[21] = solid - (area_u * solid_u + area_v * solid_v) / (area_u + area_v)
+
+        # Sizes, shapes and directions of both, and of the opening against them.
+        row[22], row[23] = peak_u * resolution, peak_v * resolution
+        row[24], row[25] = broad_u * resolution, broad_v * resolution
+        row[26], row[27], row[28] = long_u, long_v, long_both
+        row[29], row[30] = width / broad_u, width / broad_v
+        row[31], row[32] = abs(cos(axis_u - axis_v)), abs(sin(axis - axis_u))
+        row[33] = abs(sin(axis - axis_v))
+        row[34], row[35] = state.degrees[u], state.degrees[v]
+
+        # A divided or ragged opening is wider than the clearance on it allows. Then its parts, and
+        # the walls flush with it.
+        row[36] = width * resolution / max(0.3, 2 * widest * resolution)
+        row[37], row[38] = found[8], found[9] * resolution
+        row[39], row[40], row[41] = found[10], found[11], found[12]
+
+
+@njit(cache=True, nogil=True)
+def probabilities(evidence, features, thresholds, leaves, base):
+    """Return the probability of each row by a forest of complete trees, stored level by level."""
+    inner = features.shape[1]
+    found = np.empty(len(evidence))
+    for k in range(len(evidence)):
+        total = base
+        for tree in range(len(features)):
+            node = 0
+            while node < inner:
+                right = evidence[k, features[tree, node]] > thresholds[tree, node]
+                node = 2 * node + 1 + right
+            total += leaves[tree, node - inner]
+        found[k] = 1 / (1 + exp(-total))
+    return found
