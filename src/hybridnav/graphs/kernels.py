@@ -182,8 +182,8 @@ def bends(points, weights, sway, least, asked, bend, reach):
 
     `points`, `weights`, `sway`, `asked`: float64 (n, 2) and (n,), the chain, what its points count,
     how far off they may be at little cost, and the clearance to be kept; `least`: float64, the
-    clearance of the edges to each point from the up to `reach` points before, in order; `bend`:
-    cost of an edge. The other costs are how far points lie off, squared.
+    clearance of the edges to each point from those before, in order; `bend`: cost of an edge; the
+    rest is how far points lie off, squared; `reach`: most points back.
     """
     best, before = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
     best[0], behind = 0.0, 0
