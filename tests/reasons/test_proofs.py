@@ -22,7 +22,7 @@ from hybridnav.maps.files.ros import occupancy_of_greys
 from hybridnav.search.proofs import parting_chain, strings_near
 from tests.oracle.any_angle_cost import SidePoints
 from tests.plans import grid_of, map_of, points_in
-from tests.strategies import examples
+from tests.strategies import examples, occupancy_grid
 
 PRESETS = ("shortest", "octile", "grid-astar", "grid-astar by costs", "robot")
 
@@ -113,6 +113,17 @@ def test_a_bound_above_the_cost_is_no_proof(preset):
             hn.prove(result)
         bound, cost = map(float, re.findall(r"([0-9.]+) m[,:]", str(error.value)))
         assert bound > cost
+
+
+def test_an_end_between_two_walls_that_meet_may_lie_in_either_cell():
+    free = np.ones((6, 6), bool)
+    free[3, [1, 3]] = free[2, 4] = False  # the start is the corner of two of them
+    planner = planner_of(occupancy_grid(free.astype(np.uint8)), "shortest")
+    result = planner.plan((4.0, 3.0), (2.0, 1.0))
+    proof = hn.prove(result)
+    assert is_accepted(planner.grid, proof)
+    assert proof["bound"] == pytest.approx(np.sqrt(8))
+    assert proof["bound"] < result.cost
 
 
 def forged(proof, grid, rng):

@@ -235,7 +235,7 @@ def strings_near(
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)
     walls = np.pad(~free[low[0] : high[0], low[1] : high[1]], 1, constant_values=True)
     inside = ends - low + 1
-    if one_way:
+    if one_way or (ends % 1 == 0).all(axis=1).any():  # an end may lie in several cells
         bars = bars_of(np.add(free.shape, 2), {"one_way": one_way})[::2]
         part = np.s_[:, low[0] : high[0] + 2, low[1] : high[1] + 2]
         found, bound_cells = _directed_strings(walls, bars[part], inside, bound_cells)
