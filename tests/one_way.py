@@ -114,9 +114,10 @@ def planner_of(scene: Scene, preset: str) -> hn.HybridPlanner:
 _preset = lru_cache(hn.load_preset)
 
 
-def faults(scene: Scene, preset: str) -> Iterator[str]:
-    """What is wrong with the plans of a preset between the ends of a scene, in both directions."""
-    planner, one_way = planner_of(scene, preset), hn.OneWay(sides=scene.sides)
+def faults(scene: Scene, preset: str, planner: hn.HybridPlanner | None = None) -> Iterator[str]:
+    """What is wrong with the plans of a preset between the ends of a scene, in both directions;
+    `planner`: on the map of the scene, None for a new one."""
+    planner, one_way = planner or planner_of(scene, preset), hn.OneWay(sides=scene.sides)
     for i, start in enumerate(scene.placed):
         for j, goal in enumerate(scene.placed):
             by_cells = preset in CELLS

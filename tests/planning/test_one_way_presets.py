@@ -5,7 +5,7 @@ import pytest
 
 import hybridnav as hn
 from tests.one_way import PRESETS, Scene, faults, planner_of, random_scene
-from tests.strategies import examples
+from tests.strategies import examples, occupancy_grid
 
 # Random lines may lie between blocked cells alone.
 pytestmark = pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")
@@ -16,6 +16,20 @@ def test_plans_on_random_maps_are_legal_and_as_good_as_the_oracle_s(preset):
     for seed in range(examples(300 if preset == "shortest" else 100, 3_000)):
         scene = random_scene(seed)
         assert scene is None or not list(faults(scene, preset)), seed
+
+
+@pytest.mark.parametrize("preset", [name for name in PRESETS if name != "paper"])
+def test_updates_of_the_map_keep_directions(preset):
+    for seed in range(examples(12, 1_000)):
+        scene, rng = random_scene(seed), np.random.default_rng([5, seed])
+        if scene is None:
+            continue
+        planner = planner_of(scene, preset)
+        for _ in range(3):
+            free = scene.free ^ (rng.random(scene.free.shape) < 0.1)
+            scene = Scene(free, scene.sides, scene.ends)
+            planner.update(grid=occupancy_grid(free.astype(np.uint8)))
+            assert list(faults(scene, preset, planner)) == [], seed
 
 
 def test_a_diagonal_beside_a_blocked_cell_goes_round_its_corner_by_the_other():
