@@ -11,6 +11,7 @@ from hybridnav._base.trig import hypot
 from hybridnav.search.mesh.kernels.blocks import open_blocks
 from hybridnav.search.mesh.kernels.intervals import (
     APART,
+    DIRECTED,
     ENDS,
     MET,
     PARENT,
@@ -225,25 +226,14 @@ def advance(mesh, blocks, endpoints, goals, work, factor, limit):
 
 
 @njit(cache=True, nogil=True)
-def _note(work, place, g):
-    """Note the best cost of a place, -1 for none."""
-    best, counts = work.best, work.counts
-    if place >= 0 and g < best[place]:
-        if best[place] == np.inf:
-            work.touched[counts[TOUCHED]] = place
-            counts[TOUCHED] += 1
-        best[place] = g
-
-
-@njit(cache=True, nogil=True)
 def _keep(mesh, work, made, n):
     """Keep the new nodes that no cheaper path to their root rules out, and the goal if its path is
     best.
 
     Return the only node to expand, -1 for none or several.
     """
-    whole, real, best = work.whole, work.real, work.best
-    counts, bounds = work.counts, work.bounds
+    kinds, whole, real, best = mesh.kinds, work.whole, work.real, work.best
+    touched, counts, bounds = work.touched, work.counts, work.bounds
     kept = made
     n_open = 0
     only = -1
@@ -255,15 +245,19 @@ def _keep(mesh, work, made, n):
             bounds[UPPER] = g
             counts[LAST] = kept
         else:
-            root = whole[new, ROOT] = root_behind(mesh, whole[new, SLOT], root)
-            if root >= 0:
-                if g > best[root] + _SAME:
-                    continue
+            at = -1
+            if root >= 0 and kinds[root] >= DIRECTED:  # calls with a mesh are not cheap
+                root = whole[new, ROOT] = root_behind(mesh, whole[new, SLOT], root)
                 at = place_round(mesh, whole[new, SLOT], root)
-                if at >= 0 and g >= best[at]:
+            if root >= 0:
+                if g > best[root] + _SAME or (at >= 0 and g >= best[at]):
                     continue
-                _note(work, at, g)
-                _note(work, np.int64(root), g)
+                for place in (at, np.int64(root)):
+                    if place >= 0 and g < best[place]:
+                        if best[place] == np.inf:
+                            touched[counts[TOUCHED]] = place
+                            counts[TOUCHED] += 1
+                        best[place] = g
             only = kept
             n_open += 1
         if kept < new:
