@@ -51,7 +51,7 @@ BUDGETS = {
     "pyramid": (4445, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
-    "rooms": (5300, 9),
+    "rooms": (5302, 8),
     "route": (1031, 6),
     "search": (12925, 9),
     "topology": (699, 6),

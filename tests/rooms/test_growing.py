@@ -66,32 +66,23 @@ def test_places_are_the_segments_and_fields_of_the_apex_what_is_left_of_them(sce
         assert len(np.unique(both, axis=1).T) == n_parts
 
 
+@pytest.mark.parametrize("merged", [merge, contract])
 @given(scene=cut())
-def test_a_pyramid_whose_arcs_resist_ends_with_the_same_segments(scene):
-    free, label_of = scene
-    found = []
-    for merged in (merge, contract):
-        segments = segments_of(free, label_of)
-        merged(segments, [Likely(by_sizes(segments), 0.4), Small(6)])
-        found.append(len(np.unique(segments.label_of[free])))
-    assert found[0] == found[1]
-
-
-@given(scene=cut())
-def test_segments_that_are_left_apart_resist(scene):
+def test_segments_that_are_left_apart_resist(merged, scene):
     free, label_of = scene
     segments = segments_of(free, label_of)
-    merge(segments, [Likely(by_sizes(segments), 0.4)])
+    merged(segments, [Likely(by_sizes(segments), 0.4)])
     sizes = dict(zip(*np.unique(segments.label_of, return_counts=True), strict=True))
     for pair in neighbours(segments.label_of):
         assert 1 / (1 + sum(sizes[label] for label in pair) / 20) < 0.4
 
 
+@pytest.mark.parametrize("merged", [merge, contract])
 @given(scene=cut())
-def test_no_small_segment_is_left_beside_another(scene):
+def test_no_small_segment_is_left_beside_another(merged, scene):
     free, label_of = scene
     segments = segments_of(free, label_of)
-    merge(segments, [Small(12)])
+    merged(segments, [Small(12)])
     labels = segments.label_of
     beside = {label for pair in neighbours(labels) for label in pair}
     assert all((labels == label).sum() >= 12 for label in beside)

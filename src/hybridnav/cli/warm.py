@@ -241,8 +241,12 @@ def compile_plan(preset: str) -> None:
 
 def compile_rooms() -> None:
     """Compile what finds rooms, on cells small enough that it cuts along walls and merges."""
+    from hybridnav.rooms.find import divide_rooms  # noqa: PLC0415 - loads scipy
+
     grid = replace(small_grid(), frame=hn.Frame(resolution_m=0.25))
-    rooms = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=hn.find_rooms(grid))).rooms
+    labels = hn.find_rooms(grid)
+    divide_rooms(labels.label_of, {0: (0, 0)})
+    rooms = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels)).rooms
     assert rooms is not None  # noqa: S101 - they are given
     _ = rooms.listed_doors, rooms.point_of(rooms.names[0])
 

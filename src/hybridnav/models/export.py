@@ -102,7 +102,7 @@ def export_rooms(
     rooms: Rooms,
     path: PathLike,
     *,
-    tolerance_m: float = 0.3,
+    tolerance_m: float = 0.05,
     frame: str = "map",
     everything: bool = False,
 ) -> None:
@@ -121,7 +121,7 @@ def export_rooms(
     path
         The file, ending in .csv or .geojson; one that exists is replaced.
     tolerance_m
-        How coarse outlines are, in metres, as in `save_rooms`.
+        Corners go that cut off less than a square of this side, in metres.
     frame
         Name of the map frame, in GeoJSON.
     everything

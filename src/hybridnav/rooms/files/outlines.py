@@ -18,7 +18,7 @@ _LARGEST_ISLAND_M2 = 4.0
 """Area of furniture and pillars inside rooms; larger islands keep an outline."""
 _LEAST_NAMELESS_M2 = 1.0
 _LEAST_PART_M2 = 0.25
-"""Area below which a part of a room beside its largest one has no outline: most lie in a wall."""
+"""Area below which a part of a room beside its largest has no outline, at 0.3 m: in walls."""
 _DECIMALS = 2
 """Decimals of coordinates: centimetres."""
 
@@ -29,7 +29,7 @@ def outlines_of(
     """Return outlines of few corners; neighbours share those of their common border.
 
     Furniture and pillars belong to the rooms round them. Free cells near an outline may lie on its
-    other side; parts of a room below a quarter of a square metre, beside its largest, have none.
+    other side; parts of a room below 0.25 m2 (at 0.3 m), beside its largest, have none.
 
     `label_of`: int32 (rows, cols), -1 for no room; every room has a free cell; `n_rooms`: number of
     rooms; `tolerance_m`: corners go whose triangle with the two beside them has less area than a
@@ -39,7 +39,8 @@ def outlines_of(
     """
     if not n_rooms:
         return []
-    steps = _coverage(_without_islands(label_of, grid), n_rooms, _LEAST_PART_M2 / grid.cell_area_m2)
+    least_m2 = _LEAST_PART_M2 * min(1.0, tolerance_m / TOLERANCE_M) ** 2
+    steps = _coverage(_without_islands(label_of, grid), n_rooms, least_m2 / grid.cell_area_m2)
     simple = shapely.coverage_simplify(steps, tolerance_m / grid.resolution_m)
     decimals = decimals_of(grid)
     rings = [_rings(area, grid, decimals) for area in simple]

@@ -154,7 +154,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
     name: str,
     elevation_m: float | None = None,
     links: Sequence[Link] = (),
-    tolerance_m: float = 0.3,
+    tolerance_m: float = 0.05,
 ) -> FloorGraph:
     """Return the graph of a floor with all that its map knows, for `BuildingGraph`.
 
@@ -175,7 +175,7 @@ def floor_graph(  # noqa: PLR0913 - all but the first two are keywords
         Links of the building. Their ends on this floor become nodes, joined to the nearest node in
         sight.
     tolerance_m
-        How coarse outlines of rooms are, in metres, as in `save_rooms`.
+        Corners of outlines of rooms go that cut off less than a square of this side, in metres.
 
     Returns
     -------
