@@ -436,7 +436,9 @@ def check_strings(walls, bars, proof, ends, bound):
     walls[[0, -1]] = walls[:, [0, -1]] = True
     heights = np.full((4, *walls.shape), np.inf)
     for row, col, *height in proof["heights"]:
-        heights[:, row + 1 - low[0], col + 1 - low[1]] = height
+        at = row + 1 - low[0], col + 1 - low[1]
+        if 0 <= at[0] < len(walls) and 0 <= at[1] < len(walls[0]):
+            heights[:, at[0], at[1]] = height
     if len(walls) > len(walls[0]):  # there are fewer columns than rows to sweep over
         walls, ends, bars = walls.T, ends[:, ::-1], bars[[1, 0, 3, 2]].transpose(0, 2, 1)
         heights = heights[[0, 2, 1, 3]].transpose(0, 2, 1)
