@@ -8,7 +8,6 @@ import numpy as np
 
 from hybridnav._base.trig import hypot
 from hybridnav._base.typing import BoolArray, FloatArray
-from hybridnav.maps.kernels import nearest_distances
 
 _ROUNDING = 1e-9
 """Relative slack on a squared radius, so that 0.25 m is 5 cells of 0.05 m and not 4.999..."""
@@ -59,6 +58,8 @@ def clearance_cells(occupied: BoolArray) -> FloatArray:
     where none is occupied. Exact, to the last bit those of scipy's Euclidean distance transform, in
     a quarter of its time. Cells beyond the grid are not occupied.
     """
+    from hybridnav.maps.kernels import nearest_distances  # noqa: PLC0415 - loads numba
+
     return nearest_distances(occupied.astype(np.bool_, order="C"))
 
 
