@@ -41,7 +41,7 @@ BY_NAME: dict[str, Any] = {"route graph": RouteGraphMethod, "swagger-like": Swag
 @pytest.fixture(autouse=True)
 def _here(monkeypatch):
     monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
-    monkeypatch.setattr("hybridnav.harness.task._WARM", set())
+    monkeypatch.setattr("hybridnav.harness.judging._WARM", set())
 
 
 def run(folder, lines=ROOMS, **options):

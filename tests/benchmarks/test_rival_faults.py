@@ -76,7 +76,7 @@ def run(folder, names):
 @pytest.fixture(autouse=True)
 def _here(monkeypatch):
     monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
-    monkeypatch.setattr("hybridnav.harness.task._WARM", set())
+    monkeypatch.setattr("hybridnav.harness.judging._WARM", set())
 
 
 @pytest.mark.parametrize("lie", LIES)
