@@ -172,9 +172,9 @@ def inflated_costs(
     reach = min(math.ceil(inflation_m / resolution_m), sum(grid.shape))
     # Distances between centres are roots of whole numbers.
     squared = np.rint(np.minimum(clearance_cells(occupied), reach + 1) ** 2).astype(np.int64)
-    present = np.flatnonzero(np.bincount(squared.ravel()))
-    cost_of = np.zeros((reach + 1) ** 2 + 1, dtype=np.uint8)
-    for number in present[present <= reach**2].tolist():
+    counts = np.bincount(squared.ravel())
+    cost_of = np.zeros(len(counts), dtype=np.uint8)
+    for number in np.flatnonzero(counts[: reach**2 + 1]).tolist():
         cost_of[number] = cost_at(math.sqrt(number) * resolution_m, scaling, inscribed_m)
     return cost_of[squared]
 
