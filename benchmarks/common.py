@@ -1,14 +1,17 @@
 """What several subjects share: options, maps, times, tables."""
 
 import fnmatch
+import json
 import os
+import subprocess
+import sys
 import time
 import warnings
 from argparse import Namespace
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar, cast
 
 import numpy as np
 from scipy import ndimage
@@ -90,6 +93,24 @@ def timed(
         found = call()
         best = min(best, clock() - began)
     return found, best
+
+
+class Checkout:
+    """A process with the sources of one checkout, its `src`, that answers lines of JSON."""
+
+    def __init__(self, sources: Path, code: str) -> None:
+        paths = os.pathsep.join(map(str, (sources.resolve(), ROOT)))
+        self.env, pipe = {**os.environ, "PYTHONPATH": paths}, subprocess.PIPE
+        command = [sys.executable, "-c", code]
+        self.process = subprocess.Popen(command, env=self.env, stdin=pipe, stdout=pipe, text=True)
+        self._asks = cast("IO[str]", self.process.stdin)
+        self._answers = cast("IO[str]", self.process.stdout)
+
+    def ask(self, *question: Any) -> Any:
+        """Return what it says to a question."""
+        self._asks.write(json.dumps(question) + "\n")
+        self._asks.flush()
+        return json.loads(self._answers.readline())
 
 
 def largest_part(free: Any) -> LongArray:

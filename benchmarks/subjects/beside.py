@@ -15,8 +15,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import subprocess
 import sys
 import time
 from itertools import count
@@ -30,6 +28,7 @@ from benchmarks.common import (
     DATA,
     ROOT,
     SEED,
+    Checkout,
     largest_part,
     office_and_maps,
     option,
@@ -50,29 +49,8 @@ PROVED = 6
 """One of so many answers is proved."""
 CORNERS_M = 0.4 * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
 """Of the square that is closed half-way, less its middle."""
+_CODE = "from benchmarks.subjects.beside import answer_all; answer_all()"
 Ends = tuple[tuple[float, float], tuple[float, float]]
-
-
-class Worker:
-    """A process that plans with the sources of one checkout."""
-
-    def __init__(self, sources: Path) -> None:
-        code = "from benchmarks.subjects.beside import answer_all; answer_all()"
-        paths = os.pathsep.join((str(sources), str(ROOT)))
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", code],
-            env={**os.environ, "PYTHONPATH": paths},
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def ask(self, *question: Any) -> Any:
-        """Return what it says to a question."""
-        assert self.process.stdin and self.process.stdout  # noqa: S101, PT018 - pipes
-        self.process.stdin.write(json.dumps(question) + "\n")
-        self.process.stdin.flush()
-        return json.loads(self.process.stdout.readline())
 
 
 def answer_all() -> None:
@@ -121,7 +99,7 @@ def answered(planner: hn.HybridPlanner, question: list[Any], n_before: int) -> l
     return [hashlib.sha256("".join(parts).encode()).hexdigest(), seconds, middle]
 
 
-def measure(name: str, workers: list[Worker], ends: list[Ends], runs: int) -> int:
+def measure(name: str, workers: list[Checkout], ends: list[Ends], runs: int) -> int:
     """Print the line of a map and a preset; return how many answers differ."""
     ratios, times, wrong, n_asked = list[float](), list[float](), 0, 0
     for k, pair in enumerate(ends):
@@ -153,7 +131,7 @@ OPTIONS = [
 
 def main(given: Namespace) -> int:
     """Run the program."""
-    workers = [Worker(sources.resolve()) for sources in (ROOT / "src", given.other)]
+    workers = [Checkout(sources, _CODE) for sources in (ROOT / "src", given.other)]
     print_load()
     print_head("map, preset", "answers", "differ", "us before", "ratio")
     wrong = 0

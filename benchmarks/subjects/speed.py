@@ -10,7 +10,6 @@ are those of the processor, medians of `--runs`. Without --old there is nothing 
 Exits with 1 if a pyramid or a graph differs.
 """
 
-import json
 import os
 import statistics
 import subprocess
@@ -18,9 +17,18 @@ import sys
 import tempfile
 from argparse import Namespace
 from pathlib import Path
-from typing import IO, Any, cast
+from typing import Any
 
-from benchmarks.common import NEEDED_DATA, OFFICE, ROOT, matches, option, print_head, print_row
+from benchmarks.common import (
+    NEEDED_DATA,
+    OFFICE,
+    ROOT,
+    Checkout,
+    matches,
+    option,
+    print_head,
+    print_row,
+)
 from benchmarks.subjects._study_maps import RAW_MAPS, ROS_MAPS
 
 LANES = "aws_small_warehouse/002/map.yaml", "fetch_maps/4_26_15.yaml", "bwi_gdc/3ne/3ne.yaml"
@@ -66,21 +74,11 @@ for line in sys.stdin:
 """
 
 
-class Side:
-    """A process with the sources of one checkout."""
+class Side(Checkout):
+    """A process that builds with the sources of one checkout, and commands that run with them."""
 
     def __init__(self, checkout: Path) -> None:
-        self.env = {**os.environ, "PYTHONPATH": str(checkout.resolve() / "src")}
-        command, pipe = [sys.executable, "-c", _WORKER], subprocess.PIPE
-        worker = subprocess.Popen(command, env=self.env, stdin=pipe, stdout=pipe, text=True)
-        self._asks, self._answers = cast("IO[str]", worker.stdin), cast("IO[str]", worker.stdout)
-
-    def ask(self, what: str, path: Path) -> tuple[float, str, int]:
-        """Return the seconds that something took, a digest of it, and the cells of the map."""
-        self._asks.write(json.dumps([what, str(path)]) + "\n")
-        self._asks.flush()
-        seconds, digest, cells = json.loads(self._answers.readline())
-        return seconds, digest, cells
+        super().__init__(checkout / "src", _WORKER)
 
     def command_s(self, words: str) -> float:
         """Return the processor's seconds of a command, of its own processes too."""
@@ -103,7 +101,7 @@ def row_of(what: str, times: list[list[float]], *more: object) -> None:
 
 def in_turn(sides: list[Side], what: str, path: Path, runs: int) -> tuple[list[list[float]], bool]:
     """Return the times of each side, and whether all made the same; the first run only warms."""
-    found = [[side.ask(what, path) for side in sides] for _ in range(runs + 1)]
+    found = [[side.ask(what, str(path)) for side in sides] for _ in range(runs + 1)]
     same = len({digest for run in found for _, digest, _ in run}) == 1
     return [[run[k][0] for run in found[1:]] for k in range(len(sides))], same
 
@@ -126,7 +124,7 @@ def main(given: Namespace) -> int:
         path = given.data / name
         if given.map and not matches(name, given.map):
             continue
-        if sides[-1].ask("transform", path)[2] < LEAST_CELLS:
+        if sides[-1].ask("transform", str(path))[2] < LEAST_CELLS:
             continue
         times, same = in_turn(sides, "pyramid", path, given.runs)
         scipy_s = statistics.median(in_turn(sides[-1:], "transform", path, given.runs)[0][0])
