@@ -182,8 +182,8 @@ def _read_description(
     required = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
     if "floors" in values:
         raise MapError(
-            f"{where}: a building, expected one map: name that of a floor, or load it with "
-            "load_building"
+            f"{where}: a building, expected one map: name that of a floor, or have the building "
+            "read by a command of routes (plan, export, check, view) or load_building"
         )
     options = {"free_thresh": free_threshold, "occupied_thresh": occupied_threshold}
     given = {key: value for key, value in options.items() if value is not None}
