@@ -6,7 +6,7 @@ between the two ends of the door. Nothing is shared with `hybridnav.planning`.
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,9 @@ TURN_DEGREES = 50.0
 """Turn from which nobody takes one for a half of another."""
 AT_DOOR_M = 1.5
 """Distance from a door within which the instruction for it lies."""
+GRAZE_M = 3.0
+"""Length of a way in and out by one door below which nobody says that it was a visit: a path past
+a wide mouth cuts the line between the two rooms."""
 KEPT_M = 5.0
 """Length up to which a person goes on in the direction of the door that was passed."""
 
@@ -71,23 +74,35 @@ class Walk:
 
     def passages(self) -> list[Passage]:
         """Doors between two named rooms, each of which the path stays in for half a metre."""
-        changes = np.flatnonzero(np.diff(self._label)) + 1
-        begins = [0, *changes.tolist()]
-        runs = [
-            (int(self._label[begin]), begin, end)
-            for begin, end in zip(begins, [*begins[1:], len(self._label)], strict=True)
-        ]
         found = []
-        for (before, came, at), (behind, _, left) in itertools.pairwise(runs):
+        for (before, came, at), (behind, _, left) in itertools.pairwise(self._runs()):
             stays = min(at - came, left - at) * STEP_M >= NEAR_M or came == 0
             if before >= 0 and behind >= 0 and stays and (left - at) * STEP_M >= NEAR_M:
                 found += self._passage(before, behind, (came, at, left))
         return found
 
-    def _passage(self, before: int, behind: int, run: tuple[int, int, int]) -> list[Passage]:
-        came, at, left = (index * STEP_M for index in run)
+    def _runs(self) -> list[tuple[int, int, int]]:
+        """Room, first sample and end of each part of the path, grazes left out."""
+        begins = [0, *(np.flatnonzero(np.diff(self._label)) + 1).tolist()]
+        runs: list[tuple[int, int, int]] = []
+        for begin, end in zip(begins, [*begins[1:], len(self._label)], strict=True):
+            room = int(self._label[begin])
+            if len(runs) > 1 and runs[-2][0] == room and self._is_graze(room, *runs[-1]):
+                runs[-2:] = [(room, runs[-2][1], end)]
+            else:
+                runs.append((room, begin, end))
+        return runs
+
+    def _is_graze(self, beside: int, visited: int, enters: int, leaves: int) -> bool:
+        doors = [self._door(beside, visited, at) for at in (enters, leaves)]
+        return (leaves - enters) * STEP_M < GRAZE_M and None is not doors[0] == doors[1]
+
+    def _door(self, before: int, behind: int, at: int) -> hn.Door | None:
+        """The door of two rooms at a sample of the path; None where none is near."""
+        if min(before, behind) < 0:
+            return None
         names = self.rooms.labels.names
-        point = np.array([self._x[run[1]], self._y[run[1]]])
+        point = np.array([self._x[at], self._y[at]])
         near = [
             (float(np.hypot(*(middles - point).T).min()), door.number, door, middles)
             for door in self.rooms.doors
@@ -95,22 +110,18 @@ class Walk:
             for middles in [sides_of(self.rooms, door.number, before, behind)[0]]
             if len(middles)
         ]
-        if not near or min(near)[0] > 2 * self.rooms.grid.resolution_m:
+        is_near = near and min(near)[0] <= 2 * self.rooms.grid.resolution_m
+        return min(near)[2] if is_near else None
+
+    def _passage(self, before: int, behind: int, run: tuple[int, int, int]) -> list[Passage]:
+        came, at, left = (index * STEP_M for index in run)
+        door = self._door(before, behind, run[1])
+        if door is None:
             return []
-        door = min(near)[2]
         normal_rad = normal_of(self.rooms, door.number, before, behind)
-        into = self.heading(max(at - FAR_M, came), at - NEAR_M)
-        out = self.heading(at + NEAR_M, min(at + FAR_M, left))
-        return [
-            Passage(
-                door.number,
-                door.kind,
-                at,
-                degrees_to(into, normal_rad),
-                degrees_to(normal_rad, out),
-                normal_rad,
-            )
-        ]
+        into = degrees_to(self.heading(max(at - FAR_M, came), at - NEAR_M), normal_rad)
+        out = degrees_to(normal_rad, self.heading(at + NEAR_M, min(at + FAR_M, left)))
+        return [Passage(door.number, door.kind, at, into, out, normal_rad)]
 
 
 def sides_of(rooms: Any, number: int, before: int, behind: int) -> tuple[FloatArray, FloatArray]:
@@ -159,8 +170,6 @@ def degrees_to(heading_rad: float, to_rad: float) -> float:
 class Verdict:
     """What the words of one path say of its doors."""
 
-    passed: int
-    """Doors between two rooms that it passes, openings among them."""
     turns: list[Passage]
     """Those behind which the path turns by 40 degrees or more."""
     missed: list[Passage]
@@ -186,16 +195,13 @@ def judged(topology: hn.TopologicalMap, result: hn.PlanResult) -> Verdict:
     told = result.instructions
     passages = [one for one in walk.passages() if not _is_by_sight(told, _instruction(told, one))]
     at_door = {one.at_m: _instruction(told, one) for one in passages}
-    turns = [
-        one
-        for one in passages
-        if abs(one.out) >= LEAST_DEGREES and not _is_straight_opening(walk, one)
-    ]
+    wide = [one for one in passages if abs(one.out) >= LEAST_DEGREES]
+    turns = [one for one in wide if not _is_straight_opening(walk, one)]
+    lately = [_from_the_last_turn(walk, told, one) for one in passages]
     return Verdict(
-        len(passages),
         turns,
         [one for one in turns if not _is_told(told, at_door[one.at_m], one)],
-        [one for one in passages if _is_wrongly_beside(at_door[one.at_m], one, passages)],
+        [one for one in lately if _is_wrongly_beside(at_door[one.at_m], one, passages)],
         [one for one in passages if _is_wrongly_behind(at_door[one.at_m], one)],
         [one for one in passages if _is_double(at_door[one.at_m], one, passages)],
         [one for one in passages if _is_unsaid_half(told, at_door[one.at_m], one)],
@@ -224,14 +230,9 @@ def _is_straight_opening(walk: Walk, passage: Passage) -> bool:
 
 
 def _instruction(told: tuple[Instruction, ...], passage: Passage) -> Instruction | None:
-    near = [
-        (abs(one.at_m - passage.at_m), number, one)
-        for number, one in enumerate(told)
-        if one.doorway is not None and one.doorway.door == passage.number
-    ]
-    if not near or min(near)[0] > AT_DOOR_M:
-        return None
-    return min(near)[2]
+    through = [one for one in told if one.doorway and one.doorway.door == passage.number]
+    near = [one for one in through if abs(one.at_m - passage.at_m) <= AT_DOOR_M]
+    return min(near, key=lambda one: abs(one.at_m - passage.at_m), default=None)
 
 
 def _hands_behind(one: Instruction | None) -> list[float]:
@@ -256,6 +257,15 @@ def _is_told(told: tuple[Instruction, ...], at_door: Instruction | None, passage
         elif one.doorway is not None and one.doorway.beside is not None:
             hands.append(1.0 if one.doorway.beside == "left" else -1.0)
     return any(hand * passage.out > 0 for hand in hands)
+
+
+def _from_the_last_turn(walk: Walk, told: tuple[Instruction, ...], passage: Passage) -> Passage:
+    """The passage of one who came since the turn that was told last: nobody looks back past it."""
+    turns = [one.at_m for one in told if one.kind == "turn" and one.at_m < passage.at_m]
+    if not turns or turns[-1] < passage.at_m - FAR_M:
+        return passage
+    comes = walk.heading(turns[-1], passage.at_m - NEAR_M)
+    return replace(passage, into=degrees_to(comes, passage.normal_rad))
 
 
 def _is_wrongly_beside(
