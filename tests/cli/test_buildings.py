@@ -385,6 +385,31 @@ def test_out_of_order_lasts_until_it_is_opened(cli: Any, office: Path) -> None:
     assert cli("closed", office.with_name("none.yaml")).refuses(2, "there is no file")
 
 
+def test_a_link_that_leads_one_way_goes_round_by_another(cli: Any, office: Path) -> None:
+    text = office.read_text(encoding="utf-8")
+    query = "plan", office, "--from", "office 5", "--to", "2.04"
+    back = "plan", office, "--from", "2.04", "--to", "office 5"
+    taken = [cli(*each).out.partition("rides")[2].splitlines()[0] for each in (query, back)]
+    assert all("north lift" in line for line in taken)
+
+    def links(*query: Any) -> list[str]:
+        return [ride["link"] for ride in cli(*query, "--json").answer["rides"]]
+
+    up = "--one-way", "link:north lift=up"
+    assert (links(*query, *up), links(*back, *up)) == (["north lift"], ["east stairs"])
+    closed = "one-way:link:north lift=up"
+    cli("closed", office, "--close", closed, "--why", "repair")
+    assert (links(*query), links(*back)) == (["north lift"], ["east stairs"])
+    done = cli(*back, "--no-stairs")
+    assert done.code == 1
+    assert "The way down by link north lift is closed" in done.out
+    cli("closed", office, "--open", closed)
+    assert links(*back) == ["north lift"]
+    office.write_text(text.replace("kind: lift", "kind: lift\n  one_way: down"), encoding="utf-8")
+    assert (links(*query), links(*back)) == (["east stairs"], ["north lift"])
+    assert cli(*query, "--one-way", "link:lift=up").refuses(2, "no link is called 'lift=up'")
+
+
 def test_a_map_has_a_journal_too(cli: Any, tmp_path: Path) -> None:
     shutil.copytree(FIGURE.parent, tmp_path, dirs_exist_ok=True)
     file = tmp_path / FIGURE.name

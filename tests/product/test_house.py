@@ -14,8 +14,8 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_440,
-    "lines": 102_950,
+    "code": 65_540,
+    "lines": 103_085,
     "files": 438,
     "code outside ext": 50_500,
     "lines of a file, most": 600,
@@ -31,7 +31,7 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 71_560,
+    "lines of tests": 71_705,
 }
 
 BUDGETS = {
@@ -39,9 +39,9 @@ BUDGETS = {
     "cli": (3817, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),
-    "ext/fleet": (10153, 8),
+    "ext/fleet": (10291, 8),
     "ext/live": (7653, 8),
-    "ext/page": (3228, 7),
+    "ext/page": (3229, 7),
     "graphs": (6570, 6),
     "guide": (3594, 10),
     "harness": (9443, 8),

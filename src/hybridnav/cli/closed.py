@@ -23,7 +23,7 @@ CloseOption = Annotated[
     option(
         "--close WHAT",
         "Close door:N or room:NAME, or close it one way, one-way:door:N=ROOM; in a building with "
-        "FLOOR: before it, or link:NAME, link:NAME@FLOOR. May be repeated.",
+        "FLOOR: before it, or link:NAME, link:NAME@FLOOR, link:NAME=up. May be repeated.",
     ),
 ]
 OpenOption = Annotated[

@@ -202,7 +202,7 @@ OneWayOption = Annotated[
     option(
         "--one-way WHAT",
         "Pass in one direction alone: door:N=ROOM into that room, line:X,Y:X,Y from its left to "
-        "its right, or the one-way edges of a graph:FILE. May be repeated.",
+        "its right, link:NAME=up, or the one-way edges of a graph:FILE. May be repeated.",
     ),
 ]
 

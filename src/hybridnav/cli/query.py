@@ -181,7 +181,7 @@ class PlanOptions(FloorOptions):
         closing = list(self.blocked or ())
         for text in self.one_way or ():
             floor, colon, rest = text.partition(":") if self.is_building else ("", "", text)
-            closing.append(f"{floor}{colon}one-way:{rest}")
+            closing.append(text if floor == "link" else f"{floor}{colon}one-way:{rest}")
         return closing
 
 

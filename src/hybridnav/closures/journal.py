@@ -29,7 +29,7 @@ from hybridnav._base.typing import PathLike
 
 _ENDING = ".closed.yaml"
 _WHAT = re.compile(
-    r"link:(?P<link>.+)|(?:(?P<floor>.+?):)?"
+    r"(?:one-way:)?link:(?P<link>.+)|(?:(?P<floor>.+?):)?"
     r"(?:door:(?P<door>[0-9]{1,9})|room:(?P<room>.+)|one-way:(?P<one_way>(?:door|line):.+))"
 )
 _MOST_ITEMS, _MOST_TEXT = 1000, 200
@@ -57,7 +57,7 @@ class OutOfOrder:
 
     what: str
     """`link:NAME`, `door:N`, `room:NAME`, or `one-way:` and a `OneWayRule`; with `FLOOR:` before
-    the last three in a building. `link:NAME@FLOOR` for a link that is closed on one floor."""
+    the last three in a building. `link:NAME@FLOOR` is closed there, `link:NAME=up` leads up."""
     since: str = ""
     """When it was closed, UTC."""
     why: str = ""
@@ -85,7 +85,7 @@ class OutOfOrder:
 
     @property
     def link(self) -> str | None:
-        """The name of the link, with `@FLOOR` if it is closed there alone; None for no link."""
+        """The name of the link, with `@FLOOR` or `=up` as `what` has it; None for no link."""
         return self._parts["link"]
 
     @property

@@ -69,6 +69,7 @@ BUILDING_KINDS = {
     "link-missing": "links of the building that the graph does not have",
     "link-unknown": "links of the graph that the building does not have",
     "link-kind": "links of another kind than in the building",
+    "link-against": "rides against the one direction of a link of the building",
     "stop-missing": "floors at which a link stops, and that of the graph does not",
     "stop-unknown": "floors at which a link of the graph stops, and the building's does not",
     "stop-elsewhere": "ends of links that are not where the building has them",

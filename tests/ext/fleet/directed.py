@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -21,9 +22,14 @@ Spot = tuple[int, Cell]
 
 def floor_faults(seed: int, preset: str, *, n_queries: int = 3) -> Iterator[str]:
     """What is wrong with the routes over the two or three floors of a random building, of which
-    each has one to six lines, and some closed cells."""
+    each has one to six lines, and some closed cells; half of its links lead one way."""
     scene = random_building(seed, preset=preset, most_floors=3, shape=(6, 7))
     rng = np.random.default_rng([64, seed])
+    given = scene.building
+    ways: Any = rng.choice(["", "", "up", "down"], len(given.links)).tolist()
+    links = [replace(a, one_way=way or None) for a, way in zip(given.links, ways, strict=True)]
+    house = hn.ext.fleet.Building(given.floors, links, speed_m_s=given.speed_m_s)
+    scene = replace(scene, building=house)
     for _ in range(n_queries):
         ends = scene.somewhere(), scene.somewhere()
         spots = [spot_of(scene, index, point) for index, point in ends]
@@ -61,6 +67,8 @@ def optimum(scene: Scene, planes: list[OneWayPlane], ends: list[Spot], *, by_cel
     for link in usable(scene, set(), stairs=True):
         spots = [spot_of(scene, number[end.floor], end.position_m) for end in link.ends]
         for (k, one), (n, two) in itertools.permutations(list(enumerate(spots)), 2):
+            if link.one_way == ("down" if k < n else "up"):
+                continue
             weight = charge(link, k, n, building.speed_m_s)
             if weight < graph.get_edge_data(one, two, {"weight": math.inf})["weight"]:
                 graph.add_edge(one, two, weight=weight)

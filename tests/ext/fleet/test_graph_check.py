@@ -156,6 +156,16 @@ FAULTS: dict[str, tuple[BuildingGraph, dict[str, list[str]], str]] = {
         {"link-kind": ["stairs lift, which is of the kind lift"]},
         "",
     ),
+    "stairs that the building has up only, drawn both ways": (
+        drawn(B=link("B", "stairs", ("2", STAIRS), ("3", STAIRS))),
+        {"link-against": ["stairs B from floor 3 to 2"]},
+        "its ride by B is none of the building",
+    ),
+    "stairs that are drawn up only": (
+        drawn(B=replace(LINKS["B"], one_way="up")),
+        {"one-way 3": ["5"]},
+        "the graph has no route, and the building has one",
+    ),
     "a piece that is cut off": (
         drawn(without(("c", "d")), B=None),
         {
@@ -174,6 +184,9 @@ FAULTS: dict[str, tuple[BuildingGraph, dict[str, list[str]], str]] = {
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_planted_fault_is_found(house: hn.ext.fleet.Building, name: str) -> None:
     graph, findings, contradiction = FAULTS[name]
+    if "link-against" in findings:
+        one_way = replace(LINKS["B"], one_way="up")
+        house = hn.ext.fleet.Building(house.floors, [LINKS["lift"], one_way])
     matched = match_graph(house, graph)
     check = check_building_graph(matched)
     assert found(check) == findings

@@ -1,5 +1,6 @@
 """Links between floors."""
 
+import itertools
 import math
 
 import pytest
@@ -19,12 +20,27 @@ def test_a_ride_costs_the_same_both_ways():
     assert lift.end_on("4") is None
 
 
+def test_a_link_leads_up_or_down_or_both_ways():
+    led = {
+        way: [
+            one.floor + other.floor
+            for one, other in itertools.permutations(ENDS, 2)
+            if Link(name="way", kind="stairs", ends=ENDS, one_way=way).leads(one.floor, other.floor)
+        ]
+        for way in (None, "up", "down")
+    }
+    assert led["up"] == ["12", "13", "23"]
+    assert led["down"] == ["21", "31", "32"]
+    assert sorted(led[None]) == sorted(led["up"] + led["down"])
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ({"ends": ENDS[:1]}, "two or more different floors"),
         ({"ends": (*ENDS, ENDS[0])}, "two or more different floors"),
         ({"kind": "ladder"}, "not one of lift, stairs, ramp"),
+        ({"one_way": "2"}, "one_way is '2', expected up, down, or None for both ways"),
         ({"wait_s": math.nan}, "wait_s is nan"),
         ({"ride_s": -1.0}, "ride_s is -1.0"),
         ({"cost_m": math.inf}, "cost_m is inf"),

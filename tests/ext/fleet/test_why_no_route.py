@@ -1,5 +1,6 @@
 """Why there is no route over floors: what would have to open, or where an end lies."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -127,11 +128,67 @@ def test_reasons_hold_under_a_profile(profile, closed, reason):
 def test_walls_and_floors_that_no_link_joins_are_named():
     alone = building(links=()).plan(("1", KITCHEN), ("2", LAB))
     assert alone.reasons["en"] == (
-        "No lift, stairs or ramp that this robot can take joins floors 1 and 2.",
+        "No lift, stairs or ramp that this robot can take leads from floor 1 to floor 2.",
     )
     lines = [line.replace("######ll", "########") for line in HOUSE]
     walled = building(hn.HybridPlanner(topology_of(lines))).plan(("1", KITCHEN), ("2", LAB))
     assert walled.reasons["en"][0].startswith("Floor 2: Obstacles and unexplored cells enclose")
+
+
+def test_links_that_lead_the_other_way_are_named():
+    two = building()
+    lift, stairs = (
+        replace(link, one_way=way) for link, way in zip(two.links, ("up", "down"), strict=True)
+    )
+    up = Building(two.floors, [replace(stairs, one_way="up"), lift])
+    assert up.plan(("1", KITCHEN), ("2", LAB)).solved
+    back = up.plan(("2", LAB), ("1", KITCHEN))
+    assert back.reasons["en"] == (
+        "No lift, stairs or ramp that this robot can take leads from floor 2 to floor 1.",
+        "One way only, and not that way: stairs ↑, lift ↑.",
+    )
+    assert back.reasons["de"][1] == "Nur in einer Richtung, und nicht in dieser: stairs ↑, lift ↑."
+    assert back.lower_bound == math.inf
+    # Up by the lift and down by the stairs: each way has its own link.
+    both = Building(two.floors, [lift, stairs])
+    for start, goal, by in (("1", "2", "lift"), ("2", "1", "stairs")):
+        plan = both.plan((start, KITCHEN), (goal, KITCHEN), closed_links=[])
+        assert [ride.link.name for ride in plan.rides] == [by]
+        assert [
+            one.rides[0].link.name for one in both.alternatives((start, KITCHEN), (goal, LAB), 3)
+        ] == [by]
+
+
+def test_a_direction_of_a_link_may_be_left_for_a_query():
+    two = building()
+    there, back = (("1", KITCHEN), ("2", LAB)), (("2", LAB), ("1", KITCHEN))
+    shut = {"closed_links": ["lift", "stairs=up"]}
+    assert [ride.link.name for ride in two.plan(*there, **shut).rides] == ["stairs"]
+    down = two.plan(*back, **shut)
+    assert down.status == "no path"
+    assert down.to_open == ("link lift",)
+    none = two.plan(*there, closed_links=["lift", "stairs=up", "stairs=down"])
+    assert not none.solved
+    alone = two.plan(*back, closed_links=["lift@2", "stairs=up"], stairs=True)
+    assert not alone.solved
+    one = building(links=("stairs",)).plan(*back, closed_links=["stairs=up"])
+    assert one.to_open == ("the way down by link stairs",)
+    assert one.reasons["de"] == (
+        "Gesperrt ist der Weg hinab über Verbindung stairs, und einen anderen Weg gibt es nicht.",
+    )
+    with pytest.raises(InvalidValueError, match=r"no link is called 'stair=up'.*stairs=up"):
+        two.plan(*there, closed_links=["stair=up"])
+
+
+def test_a_goal_that_doors_lead_out_of_alone_is_named():
+    two = building()
+    out = {"2": {"one_way": {"doors": [(6, "corridor"), (3, "corridor")]}}}
+    plan = two.plan(("1", KITCHEN), ("2", "lab"), blocked=out)
+    assert not plan.solved
+    assert plan.reasons["en"] == (
+        "Floor 2: Only door 6 leads to the goal, and may be crossed only away from it.",
+    )
+    assert two.plan(("2", "lab"), ("1", KITCHEN), blocked=out).solved
 
 
 @pytest.mark.parametrize("blocked", [["door 4"], 5, "2:door:6", [{"doors": [4]}]])

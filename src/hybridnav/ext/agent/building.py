@@ -80,7 +80,7 @@ class BuildingAnswers(_Answers):
             {"name": one.name, "kind": one.kind, "floors": [end.floor for end in one.ends]}
             for one in building.links
         ]
-        by = ", ".join(one.name for one in building.links) or "no link"
+        by = ", ".join(one.label for one in building.links) or "no link"
         return {
             "text": f"{self._site.name}: floors {', '.join(on)}, joined by {by}; "
             f"robot radius {radius_m} m.",

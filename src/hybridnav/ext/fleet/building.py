@@ -15,7 +15,7 @@ from hybridnav.closures.blocked import Blocked, Closable, as_blocked
 from hybridnav.errors import InvalidValueError, MapError, brief
 from hybridnav.ext.fleet import checks, why
 from hybridnav.ext.fleet.floors import Floor, FloorTable, Known, building_parts
-from hybridnav.ext.fleet.links import ClosedLink, Endpoint, Link, LinkNetwork
+from hybridnav.ext.fleet.links import ClosedLink, Endpoint, Link, LinkNetwork, left_by
 from hybridnav.ext.fleet.plan import BuildingAlternatives, BuildingPlan
 from hybridnav.ext.fleet.search import Answers, LinkSearch
 from hybridnav.maps.names import place_of_name
@@ -171,7 +171,8 @@ class Building:
         blocked
             Closures for this query by the name of the floor, each as in `HybridPlanner.plan`.
         closed_links
-            Names of links that are out of order, with `@FLOOR` for one floor: `"north lift@2"`.
+            Names of links that are out of order, with `@FLOOR` for one floor: `"north lift@2"`; or
+            with the one direction that is left: `"stairs=up"`.
         stairs
             Whether the robot takes stairs.
         at
@@ -324,11 +325,8 @@ class Building:
         network = self._networks.get(key)
         if network is None:
             radius_m = self.robot_radius_m
-            links = [
-                link
-                for link in self.links
-                if ClosedLink(link.name) not in key[0] and link.admits(radius_m, stairs=key[1])
-            ]
+            fitting = [link for link in self.links if link.admits(radius_m, stairs=key[1])]
+            links = [left for link in fitting if (left := left_by(link, key[0])) is not None]
             network = LinkNetwork(links, self._index_of, self._rows, self.speed_m_s, key[0])
             self._networks = {**dict(list(self._networks.items())[-15:]), key: network}
         return network
@@ -385,7 +383,8 @@ class Building:
                 on[name] = on.get(name, Blocked()) | own
             return on
 
-        opening = why.to_open(shut, is_solved), shut_on(asked.blocked), shut_on({})
+        always = why.conditions([], asked.blocked)["blocked"]
+        opening = why.to_open(shut, is_solved), shut_on(asked.blocked), shut_on(always)
         of: dict[str, Any] = {
             "reasons": why.reasons(routes[0], endpoints, self.floors, network, opening),
             "to_open": tuple(one.named("en") for one in opening[0]),

@@ -314,7 +314,7 @@ def build_over_floors(args: BuildOptions) -> None:
     with common.stage(f"writing {out}", seconds, "write"):
         hn.save(building, out, compress=args.compress)
     names = ", ".join(printable(floor.name) for floor in building.floors)
-    links = ", ".join(printable(link.name) for link in building.links) or "none"
+    links = ", ".join(printable(link.label) for link in building.links) or "none"
     lines = [
         f"model      {printable(out)}, {out.stat().st_size / 1e6:.2f} MB",
         f"floors     {len(building.floors)}: {names}",

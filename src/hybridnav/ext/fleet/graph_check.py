@@ -18,9 +18,12 @@ from hybridnav.ext.fleet.graph_match import (
     BuildingGraphCheck,
     BuildingGraphReport,
     MatchedGraph,
+    MatchedLink,
     RouteCounts,
+    rides_of,
 )
 from hybridnav.ext.fleet.graph_network import BuildingNetwork, GraphRoute, Position
+from hybridnav.ext.fleet.links import Link
 from hybridnav.ext.fleet.plan import BuildingPlan
 from hybridnav.graphs.check import GraphCheck, check_graph
 from hybridnav.graphs.free_space import LEAST_AREA_M2
@@ -102,21 +105,30 @@ def _add_links(findings: Findings, matched: MatchedGraph, network: BuildingNetwo
         if own.name not in met and own.admits(matched.building.robot_radius_m):
             findings.add("link-missing", f"{own.kind} {own.name}")
     for link in matched.links:
-        drawn, own_link = link.drawn, link.own
-        what = f"{drawn.kind} {shown(drawn.name)}"
-        if own_link is None:
+        what = f"{link.drawn.kind} {shown(link.drawn.name)}"
+        if link.own is None:
             findings.add("link-unknown", what, *link.ends.values())
-            continue
-        if own_link.kind != drawn.kind:
-            findings.add("link-kind", f"{what}, which is of the kind {own_link.kind}")
-        for end in own_link.ends:
-            if end.floor in matched.floors and end.floor not in link.ends:
-                findings.add("stop-missing", f"{what} at floor {end.floor}", end.position_m)
-        for floor, point in link.ends.items():
-            fault = network.stop_fault(link, floor)
-            if fault:
-                kind = "stop-unknown" if own_link.end_on(floor) is None else "stop-elsewhere"
-                findings.add(kind, f"{what} at floor {floor}: {fault}", point)
+        else:
+            _add_link(findings, link, link.own, network)
+
+
+def _add_link(findings: Findings, link: MatchedLink, own: Link, network: BuildingNetwork) -> None:
+    """Add what is wrong with a link that stands for one of the building."""
+    what = f"{link.drawn.kind} {shown(link.drawn.name)}"
+    drawn_on = {floor.name for floor in network.floors.values()}
+    if own.kind != link.drawn.kind:
+        findings.add("link-kind", f"{what}, which is of the kind {own.kind}")
+    for one, other, may in rides_of(link):
+        if not may:
+            findings.add("link-against", f"{what} from floor {one} to {other}", link.ends[one])
+    for end in own.ends:
+        if end.floor in drawn_on and end.floor not in link.ends:
+            findings.add("stop-missing", f"{what} at floor {end.floor}", end.position_m)
+    for floor, point in link.ends.items():
+        fault = network.stop_fault(link, floor)
+        if fault:
+            kind = "stop-unknown" if own.end_on(floor) is None else "stop-elsewhere"
+            findings.add(kind, f"{what} at floor {floor}: {fault}", point)
 
 
 def _add_pieces(findings: Findings, network: BuildingNetwork) -> None:

@@ -1,6 +1,7 @@
 """The graph of a building that others have made, matched to its maps; faults and routes found."""
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -44,6 +45,13 @@ class MatchedLink:
     """The graph's name of each floor at which it stops, by the building's."""
     ends: dict[str, Point]
     """Where it stops on each of them, `(x, y)` in metres in the frame of the map."""
+
+
+def rides_of(link: MatchedLink) -> Iterator[tuple[str, str, bool]]:
+    """Yield from which floor to which a link of a graph leads, and whether the building's may."""
+    for one, other in itertools.permutations(link.ends, 2):
+        if link.drawn.leads(link.floors[one], link.floors[other]):
+            yield one, other, link.own is None or link.own.leads(one, other)
 
 
 @dataclass(frozen=True, eq=False)

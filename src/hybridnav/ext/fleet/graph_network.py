@@ -12,7 +12,7 @@ import numpy as np
 from hybridnav._base.trig import dist, hypots
 from hybridnav._base.typing import BoolArray, FloatArray, LongArray
 from hybridnav.ext.fleet.building import Building
-from hybridnav.ext.fleet.graph_match import AT_LINK_M, MatchedGraph, MatchedLink
+from hybridnav.ext.fleet.graph_match import AT_LINK_M, MatchedGraph, MatchedLink, rides_of
 from hybridnav.ext.fleet.link_nodes import FloorGraph, Point, node_at
 from hybridnav.graphs import attach
 from hybridnav.maps import OccupancyGrid
@@ -240,8 +240,8 @@ class BuildingNetwork:
         """Add the rides of a link, between any two of its ends."""
         faults = {floor: self.stop_fault(link, floor) for floor in link.ends}
         node = {floor: self._of_name[floor].base + self._node(link, floor) for floor in link.ends}
-        for one, other in itertools.permutations(link.ends, 2):
-            is_sound = not (faults[one] or faults[other])
+        for one, other, may in rides_of(link):
+            is_sound = may and not (faults[one] or faults[other])
             if clear_edges_only and not is_sound:
                 continue
             cost = self._charge(link, one, other)

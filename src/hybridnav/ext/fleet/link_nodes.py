@@ -165,6 +165,8 @@ class BuildingGraph:
 
 Stub = tuple[str, tuple[float, float], int]
 """Name of a link, its end in metres, and the node that it is joined to."""
+Stop = tuple[FloorGraph, int]
+"""A floor that a link stops at, and the node at its end there."""
 
 
 def join_links(building: BuildingGraph) -> BuildingGraph:
@@ -217,8 +219,7 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
     """Return one graph of all floors of a building, with nodes `(floor, id)`.
 
     Floors are as `WaypointGraph.to_networkx` returns them. The nodes at the ends of a link are
-    joined from floor to floor, in both directions, with its name as `link`, `kind`, `ride_s` and
-    `cost_m`.
+    joined from floor to floor, as it leads, with its name as `link`, `kind`, `ride_s` and `cost_m`.
 
     Parameters
     ----------
@@ -254,11 +255,10 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
         for tail, head, facts in plain.edges(data=True):
             whole.add_edge((floor.name, tail), (floor.name, head), **facts)
     for link in joined.links:
-        at = [(floor.name, floor.graph.names[node]) for floor, node in nodes_of_link(joined, link)]
         facts = {"link": link.name, "kind": link.kind, "ride_s": link.ride_s, "cost_m": link.cost_m}
-        for pair in itertools.pairwise(at):
-            whole.add_edge(*pair, **facts)
-            whole.add_edge(*pair[::-1], **facts)
+        for ends in rides_between(joined, link):
+            tail, head = ((floor.name, floor.graph.names[node]) for floor, node in ends)
+            whole.add_edge(tail, head, **facts)
     return whole
 
 
@@ -269,7 +269,7 @@ def node_at(graph: WaypointGraph, point: tuple[float, float]) -> int | None:
     return nearest if away[nearest] <= SAME_POINT_M else None
 
 
-def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph, int]]:
+def nodes_of_link(building: BuildingGraph, link: Link) -> list[Stop]:
     """Return the floors that a link stops at, and the node at its end on each.
 
     `building`: a building with nodes at all ends, as `join_links` returns it; `link`: one of its
@@ -282,6 +282,13 @@ def nodes_of_link(building: BuildingGraph, link: Link) -> list[tuple[FloorGraph,
         assert node is not None  # noqa: S101 - links are joined
         stops.append((floor, node))
     return stops
+
+
+def rides_between(building: BuildingGraph, link: Link) -> list[tuple[Stop, Stop]]:
+    """Return from where to where a link leads to its next floor; see `nodes_of_link`."""
+    up = list(itertools.pairwise(nodes_of_link(building, link)))
+    down = [(high, low) for low, high in up]
+    return [pair for pair in [*up, *down] if link.leads(pair[0][0].name, pair[1][0].name)]
 
 
 def with_stubs(graph: WaypointGraph, stubs: Sequence[Stub]) -> WaypointGraph:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -16,6 +16,9 @@ from hybridnav.maps.names import place_of_name
 
 LinkKind = Literal["lift", "stairs", "ramp"]
 """Kinds of links between floors."""
+Direction = Literal["up", "down"]
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+"""Towards later ends of a link, and towards earlier ones."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class LinkEnd:
 
 @dataclass(frozen=True, kw_only=True)
 class Link:
-    """A lift, stairs or a ramp. It leads in both directions between any two of its ends.
+    """A lift, stairs or a ramp. It leads from any of its ends to any other, or one way only.
 
     A ride costs `wait_s`, and from one end to the next one `ride_s`, in seconds, and `cost_m` in
     metres on top: a planner charges `cost_m + speed * seconds`.
@@ -66,8 +69,8 @@ class Link:
     Raises
     ------
     InvalidValueError
-        When the kind is not known, or there are not two ends on different floors. When a time or
-        the cost is negative or not finite, or the greatest radius is not above 0.
+        When the kind or the direction is not known, or there are not two ends on different floors.
+        When a time or the cost is negative or not finite, or the greatest radius is not above 0.
 
     Examples
     --------
@@ -92,6 +95,8 @@ class Link:
     """Metres that a ride is charged beside its time."""
     max_radius_m: float = math.inf
     """Radius in metres of the largest robot that fits in."""
+    one_way: Direction | None = None
+    """`"up"` leads to later ends alone, as an escalator, `"down"` to earlier ones; None to all."""
 
     def __post_init__(self) -> None:
         """Refuse what no planner could use."""
@@ -99,6 +104,11 @@ class Link:
             kinds = ", ".join(get_args(LinkKind))
             raise InvalidValueError(
                 f"link {self.name} is of kind {self.kind!r:.40}, not one of {kinds}"
+            )
+        if self.one_way not in (None, *DIRECTIONS):
+            raise InvalidValueError(
+                f"link {self.name}: one_way is {self.one_way!r:.40}, expected up, down, or None "
+                "for both ways"
             )
         floors = [end.floor for end in self.ends]
         if len(floors) <= 1 or len(set(floors)) < len(floors):
@@ -128,6 +138,23 @@ class Link:
             Whether the robot takes stairs.
         """
         return robot_radius_m <= self.max_radius_m and (stairs or self.kind != "stairs")
+
+    @property
+    def label(self) -> str:
+        """Its name, with an arrow where it leads one way: `escalator ↑`."""
+        return self.name + {None: "", "up": " ↑", "down": " ↓"}[self.one_way]
+
+    def leads(self, from_floor: str, to_floor: str) -> bool:
+        """Return whether one may ride from one floor that it stops at to another.
+
+        Parameters
+        ----------
+        from_floor, to_floor
+            Names of the floors.
+        """
+        floors = [end.floor for end in self.ends if end.floor in (from_floor, to_floor)]
+        backward = "down" if floors == [from_floor, to_floor] else "up"
+        return self.one_way != backward
 
     def end_on(self, floor: str) -> LinkEnd | None:
         """Return the end on a floor, None if it does not stop there.
@@ -217,16 +244,18 @@ class Ride:
 
 
 class ClosedLink(NamedTuple):
-    """A link that is out of order, on one floor or on all."""
+    """A link that is out of order, on one floor or on all, or but for one direction."""
 
     link: str
     """Name of the link."""
     floor: str | None = None
     """Floor on which nobody enters or leaves it, None for all."""
+    left: Direction | None = None
+    """The direction that stays open, None for none."""
 
     @classmethod
     def of(cls, text: str, links: Sequence[Link]) -> ClosedLink:
-        """Return what a text names: `north lift`, or `north lift@2`.
+        """Return what a text names: `north lift`, `north lift@2`, or `north lift=up`.
 
         Raises `InvalidValueError` when no link has this name, or stops there.
         """
@@ -234,7 +263,19 @@ class ClosedLink(NamedTuple):
         if isinstance(text, str) and "@" in text:
             stops = [cls(link.name, end.floor) for link in links for end in link.ends]
             by_text = {f"{one.link}@{one.floor}": one for one in stops} | by_text
+        if isinstance(text, str) and text.endswith(tuple(f"={way}" for way in DIRECTIONS)):
+            ways = [cls(link.name, left=way) for link in links for way in DIRECTIONS]
+            by_text = {f"{one.link}={one.left}": one for one in ways} | by_text
         return list(by_text.values())[place_of_name(text, tuple(by_text), "link")]
+
+
+def left_by(link: Link, closed: Collection[ClosedLink]) -> Link | None:
+    """Return what closures leave of a link on all its floors: it, its one direction, or None."""
+    given = (link.one_way, *(one.left for one in closed if one.link == link.name))
+    ways = {way for way in given if way is not None}
+    if ClosedLink(link.name) in closed or len(ways) > 1:
+        return None
+    return replace(link, one_way=ways.pop()) if ways else link
 
 
 # The ends of links, the rides between them, and the cheapest ways over them.
@@ -296,7 +337,7 @@ class LinkNetwork:
             (number, end.floor)
             for number, link in enumerate(links)
             for end in link.ends
-            if (link.name, end.floor) not in closed
+            if ClosedLink(link.name, end.floor) not in closed
         ]
         self.ends = [
             End(number, floor_of[floor], rows[links[number].name, floor]) for number, floor in stops
@@ -311,7 +352,7 @@ class LinkNetwork:
             [
                 (other, link.charge_m(names[number], names[other], speed_m_s=speed_m_s))
                 for other in of_link[end.link]
-                if other != number
+                if other != number and link.leads(names[number], names[other])
             ]
             for number, end in enumerate(self.ends)
             for link in (links[end.link],)

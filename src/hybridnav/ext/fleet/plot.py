@@ -254,7 +254,7 @@ def _draw_end(
     mark.set_data([x], [y])
     mark.set_gid(f"link-{link.name}")
     canvas.ax.add_line(mark)
-    words = link.name if to is None else f"{link.name}, to floor {to}"
+    words = link.label if to is None else f"{link.label}, to floor {to}"
     size = 0.85 * canvas.sizes.font
     half = np.array([text_width(words, size, "bold") / 2, 0.6 * size])
     reaches = 0.75 * _POINTS * canvas.sizes.line, 1.6 * _POINTS * canvas.sizes.line

@@ -4,11 +4,12 @@ import operator
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from itertools import permutations
 from typing import Any
 
 from hybridnav.closures.blocked import Blocked, Closable, as_blocked
 from hybridnav.ext.fleet.floors import Floor
-from hybridnav.ext.fleet.links import ClosedLink, Endpoint, LinkNetwork
+from hybridnav.ext.fleet.links import ClosedLink, Endpoint, Link, LinkNetwork
 from hybridnav.ext.fleet.plan import BuildingPlan
 from hybridnav.planning import PlanStatus
 from hybridnav.reasons.why import Explanation, each_closure, explain
@@ -18,25 +19,32 @@ _WORDS = {
     "en": {
         "link": "link {0}",
         "stop": "link {0} on floor {1}",
+        "up": "the way down by link {0}",
+        "down": "the way up by link {0}",
         "stairs": "the way by stairs",
         "on": "floor {0}, {1}",
         "open": "{0} is closed, and there is no other way.",
         "more": "If {0} open, there is a route; if one of them stays closed, none.",
         "and": "and",
-        "apart": "No lift, stairs or ramp that this robot can take joins floors {0} and {1}.",
+        "apart": "No lift, stairs or ramp that this robot can take leads from floor {0} to floor "
+        "{1}.",
+        "cut": "One way only, and not that way: {0}.",
         "end": "Floor {0}: {1}",
         "between": "On a floor between, no way joins the ends of the links.",
     },
     "de": {
         "link": "Verbindung {0}",
         "stop": "Verbindung {0} auf Etage {1}",
+        "up": "der Weg hinab über Verbindung {0}",
+        "down": "der Weg hinauf über Verbindung {0}",
         "stairs": "der Weg über Treppen",
         "on": "Etage {0}, {1}",
         "open": "Gesperrt ist {0}, und einen anderen Weg gibt es nicht.",
         "more": "Mit {0} offen gibt es einen Weg; bleibt eines davon gesperrt, keinen.",
         "and": "und",
         "apart": "Kein Aufzug, keine Treppe und keine Rampe, die dieser Roboter nehmen kann, "
-        "verbindet die Etagen {0} und {1}.",
+        "führt von Etage {0} auf Etage {1}.",
+        "cut": "Nur in einer Richtung, und nicht in dieser: {0}.",
         "end": "Etage {0}: {1}",
         "between": "Auf einer Etage dazwischen verbindet kein Weg die Enden der Verbindungen.",
     },
@@ -56,7 +64,8 @@ class Shut:
         """Return its name in a sentence."""
         words = _WORDS[language]
         if self.link is not None:
-            return words["link" if self.link.floor is None else "stop"].format(*self.link)
+            key = self.link.left or ("link" if self.link.floor is None else "stop")
+            return words[key].format(*self.link)
         if self.floor is None or self.closure is None:
             return words["stairs"]
         return words["on"].format(self.floor, closure_words(self.closure, language))
@@ -120,7 +129,7 @@ def reasons(
     """Return why a plan has no route, in each language.
 
     `network`: the links that may be used with nothing closed; `opening`: what would have to open,
-    what is closed on each floor, and what of it a profile closes for all queries.
+    what is closed on each floor, and what of it always is: by a profile, or as a direction.
     """
     opened, blocked, always = opening
     at = [_point_of(end, floors) for end in endpoints]
@@ -153,10 +162,16 @@ def reasons(
     reached = {names[0]}
     for _ in floors:
         for link in network.links:
-            stops = {stop.floor for stop in link.ends}
-            reached |= stops if stops & reached else set()
+            for one, other in permutations([stop.floor for stop in link.ends], 2):
+                reached |= {other} if one in reached and link.leads(one, other) else set()
     if names[1] not in reached:
-        return _each(lambda to: [_WORDS[to]["apart"].format(*names)])
+        # Links between what is reached and what is not lead the other way.
+        cut = [
+            one.label for one in network.links if len({e.floor in reached for e in one.ends}) > 1
+        ]
+        lines = ["apart", *(["cut"] if cut else [])]
+        words = {"apart": names, "cut": [", ".join(cut)]}
+        return _each(lambda to: [_WORDS[to][line].format(*words[line]) for line in lines])
     return _each(lambda to: [_WORDS[to]["between"]])
 
 
@@ -179,12 +194,20 @@ def _enclosed(
     floor = floors[endpoints[number].floor]
     here, other = (_point_of(endpoints[which], floors) for which in (number, 1 - number))
     ways: list[tuple[float, ...]] = [
-        stop.position_m for link in network.links if (stop := link.end_on(floor.name))
+        stop.position_m
+        for link in network.links
+        if (stop := link.end_on(floor.name)) and _leads(link, floor.name, number)
     ]
     ways += [other] if endpoints[0].floor == endpoints[1].floor else []
-    closed = blocked.get(floor.name)
-    reasons = [explain(floor.planner, here, way, blocked=closed) for way in ways]
+    pairs = [((here, way), (way, here))[number] for way in ways]
+    reasons = [explain(floor.planner, *pair, blocked=blocked.get(floor.name)) for pair in pairs]
     return reasons[-1] if reasons and not any(one.has_path for one in reasons) else None
+
+
+def _leads(link: Link, floor: str, number: int) -> bool:
+    """Return whether a link leads away from a floor, number 0, or to it."""
+    pairs = [(floor, end.floor) for end in link.ends if end.floor != floor]
+    return any(link.leads(*pair[:: -1 if number else 1]) for pair in pairs)
 
 
 def _each(lines: Callable[[str], list[str]]) -> dict[str, tuple[str, ...]]:

@@ -280,6 +280,7 @@ class _OverFloors:
             {
                 "name": link.name,
                 "kind": link.kind,
+                "label": link.label,
                 "fits": link.admits(building.robot_radius_m),
                 "ends": [
                     {

@@ -50,5 +50,7 @@ def buildings(draw, *, kinds=("lift", "stairs", "ramp"), aligned=False):
         ]
         radius = draw(st.sampled_from([0.5, 1.25, float("inf")]))
         times = {key: draw(st.integers(0, 60)) / 2 for key in ("wait_s", "ride_s", "cost_m")}
-        links.append(Link(name=name, kind=kind, ends=tuple(ends), max_radius_m=radius, **times))
+        way = draw(st.sampled_from([None, None, "up", "down"]))
+        facts = times | {"max_radius_m": radius, "one_way": way}
+        links.append(Link(name=name, kind=kind, ends=tuple(ends), **facts))
     return BuildingGraph(name=draw(NAMES), floors=tuple(drawn), links=tuple(links))

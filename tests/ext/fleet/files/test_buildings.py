@@ -73,6 +73,23 @@ def test_a_file_says_what_the_building_is(folder: Path) -> None:
     assert plan.gap == 0.0
 
 
+@pytest.mark.parametrize("preset", ["shortest", "octile", "grid-astar", "paper", "robot"])
+def test_a_link_leads_up_alone_if_the_file_says_so(folder: Path, preset: str) -> None:
+    written(folder, with_link(one_way="up"))
+    file = folder / "building.yaml"
+    building = hn.ext.fleet.load_building(file, robot_radius_m=0, preset=preset)
+    assert building.link("lift").label == "lift ↑"
+    hn.save(building, folder / "b.hnm")
+    filed = hn.ext.fleet.load_building(folder / "b.hnm")
+    ends = ("1", (1.2, 2.2)), ("2", "lab")
+    for house in (building, filed):
+        assert house.links[0].one_way == "up"
+        assert house.plan(*ends).solved
+        back = house.plan(*ends[::-1])
+        assert back.lower_bound == math.inf
+        assert back.reasons["en"][1] == "One way only, and not that way: lift ↑."
+
+
 def test_an_end_stands_on_the_side_of_a_door_that_is_said(folder: Path) -> None:
     for room, yaw_rad, x in (("lab", math.pi, 2.75), ("hall", 0.0, 3.25)):
         end = {"floor": "2", "door": 1, "room": room}
@@ -119,6 +136,10 @@ REFUSED: dict[str, tuple[Any, str]] = {
     "both rooms": (with_floor(find_rooms=True), "rooms and find_rooms are both given"),
     "find what": (with_floor(find_rooms="yes, please"), "find_rooms must be true or false"),
     "speed": (description(speed_m_s=0), "speed_m_s is 0.0, expected a finite number"),
+    "one way": (
+        with_link(one_way="2"),
+        "link lift: one_way must be up or down, or left out for both ways, got '2'",
+    ),
     "kind": (with_link(kind="rope"), "link lift: kind must be lift, stairs, ramp, got 'rope'"),
     "wait": (with_link(wait_s=-1), "wait_s is -1.0, expected a finite number >= 0"),
     "endless ride": (with_link(ride_s=float("inf")), "ride_s must be a finite number, got inf"),

@@ -47,8 +47,9 @@ def test_a_master_control_finds_every_node_and_edge(file, building):
     wanted = Counter(
         (f"{link.kind} {link.name}", floor)
         for link in building.links
-        for pair in itertools.pairwise(end.floor for end in link.ends)
-        for floor in pair
+        for low, high in itertools.pairwise(end.floor for end in link.ends)
+        for floor, way in ((low, "up"), (high, "down"))
+        if link.one_way in (None, way)
     )
     assert crossing == wanted
 
@@ -68,8 +69,8 @@ def test_what_is_read_back_is_what_was_written(file, building):
             for graph in (read.graph, written.graph)
         ]
         assert speeds[0] == speeds[1]
-    assert {(link.name, link.kind) for link in back.links} == {
-        (link.name, link.kind) for link in building.links
+    assert {(link.name, link.kind, link.one_way) for link in back.links} == {
+        (link.name, link.kind, link.one_way) for link in building.links
     }
     ends = {link.name: link.ends for link in back.links}
     for link in building.links:

@@ -89,7 +89,7 @@ def test_what_is_read_back_is_what_was_written(file, building, anchor):
         assert not read.graph.findings
     for link, known in zip(back.links, building.links, strict=True):
         assert link.name.startswith(in_xml(known.name))
-        for key in ("kind", "wait_s", "ride_s", "cost_m", "max_radius_m"):
+        for key in ("kind", "wait_s", "ride_s", "cost_m", "max_radius_m", "one_way"):
             assert getattr(link, key) == getattr(known, key)
         for one, other in zip(link.ends, known.ends, strict=True):
             assert one.position_m == pytest.approx(other.position_m, abs=0.011)
@@ -308,6 +308,32 @@ def test_links_between_foot_ways_have_their_levels_on_the_way(tmp_path, tags, ki
     at = dict(zip((1, 2, 3, 4), building.floors[0].graph.points.tolist(), strict=False))
     assert link.ends[0].position_m == pytest.approx(tuple(at[2]))
     assert left_out(building) == []
+
+
+@pytest.mark.parametrize(
+    ("tags", "way"),
+    [
+        # OpenStreetMap's wiki, Key:conveying and Key:oneway, of 2026: escalators are steps that
+        # convey along the line or back, and `reversible` ones either way.
+        ({"conveying": "forward"}, "up"),
+        ({"conveying": "backward"}, "down"),
+        ({"conveying": "reversible"}, None),
+        ({"oneway": "yes"}, "up"),
+        ({"oneway": "-1"}, "down"),
+        ({"oneway": "no", "conveying": "yes"}, None),
+    ],
+)
+def test_escalators_and_moving_walkways_lead_one_way(tmp_path, tags, way):
+    for refs, turned in (([2, 3], way), ([3, 2], {"up": "down", "down": "up"}.get(way))):
+        steps = refs, {"highway": "steps", "level": "0;1"} | tags
+        walkway = [{2: 1, 3: 4}[ref] for ref in refs], {"highway": "footway", "level": "0"} | tags
+        building = drawn(tmp_path, [*WALKS, steps, walkway])
+        assert building.links[0].one_way == turned
+        graph = building.floors[0].graph
+        tail, head = (graph.names.index(node) for node in (1, 4))
+        edges = [[tail, head], [head, tail]]
+        is_there = [edge in graph.edges.tolist() for edge in edges]
+        assert is_there == [turned != "down", turned != "up"]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from hybridnav._base.typing import PathLike
 from hybridnav._base.yaml_file import Limits, Marked, read_marked
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, brief
 from hybridnav.ext.fleet import LinkKind
+from hybridnav.ext.fleet.links import DIRECTIONS, Direction
 from hybridnav.maps import OneWayRule
 from hybridnav.planning import Profile
 
@@ -21,7 +22,7 @@ _FILE_KEYS = ("floors", "links", "speed_m_s", "profiles")
 _MOST_PROFILES = 100
 _MOST_RULES = 1000
 _FLOOR_KEYS = ("name", "map", "elevation_m", "rooms", "find_rooms", "one_way")
-_LINK_KEYS = ("name", "kind", "ends", "wait_s", "ride_s", "cost_m", "max_radius_m")
+_LINK_KEYS = ("name", "kind", "ends", "wait_s", "ride_s", "cost_m", "max_radius_m", "one_way")
 _END_KEYS = ("floor", "at", "room", "door", "yaw_rad")
 _FARTHEST = 1e9
 
@@ -61,6 +62,7 @@ class LinkEntry:
     ends: tuple[EndEntry, ...]
     numbers: dict[str, float]
     """Its times, its cost, and the radius of robots that fit in, by their names."""
+    one_way: Direction | None
     at: str
 
 
@@ -165,8 +167,12 @@ def _link(marked: Marked, where: str, item: Any, index: int) -> LinkEntry:
     kinds = get_args(LinkKind)
     if kind not in kinds:
         raise MapError(f"{at}: link {name}: kind must be {', '.join(kinds)}, got {brief(kind)}")
+    one_way = values.given.get("one_way")
+    if one_way is not None and one_way not in DIRECTIONS:
+        ways = f"{' or '.join(DIRECTIONS)}, or left out for both ways"
+        raise MapError(f"{at}: link {name}: one_way must be {ways}, got {brief(one_way)}")
     ends = values.list_of("ends", MOST_FLOORS)
-    numbers = {key: values.number(key) for key in _LINK_KEYS[3:]}
+    numbers = {key: values.number(key) for key in _LINK_KEYS[3:-1]}
     return LinkEntry(
         name,
         kind,
@@ -175,6 +181,7 @@ def _link(marked: Marked, where: str, item: Any, index: int) -> LinkEntry:
             for i, end in enumerate(ends)
         ),
         {key: number for key, number in numbers.items() if number is not None},
+        one_way,
         at,
     )
 

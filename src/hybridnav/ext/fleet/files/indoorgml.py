@@ -299,6 +299,8 @@ def _add_links(layer: nx.MultiGraph[str], building: Building) -> Iterator[str]:
         for (one, below), (other, above) in pairwise(stops):
             cost = link.charge_m(below, above, speed_m_s=building.speed_m_s)
             layer.add_edge(one, other, f"{one}-{other}.edge", weight=round(cost, _DECIMALS))
+        if link.one_way:
+            yield f"{link.kind} {link.label}: its direction"
         if math.isfinite(link.max_radius_m):
             yield f"{link.kind} {link.name}: the largest robot that fits in"
     if any(floor.elevation_m for floor in building.floors):

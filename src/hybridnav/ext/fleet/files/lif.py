@@ -14,7 +14,8 @@ from hybridnav.errors import InvalidValueError, MapError
 from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, LinkKind, join_links
 from hybridnav.ext.fleet.files import rmf_read as rmf
 from hybridnav.ext.fleet.files.rmf_write import speed_limit_of
-from hybridnav.ext.fleet.link_nodes import nodes_of_link
+from hybridnav.ext.fleet.link_nodes import rides_between
+from hybridnav.ext.fleet.links import DIRECTIONS
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.files.json_graphs import json_errors
 from hybridnav.graphs.gather import Gathered, pair_of, shown
@@ -37,8 +38,9 @@ def read_lif(text: str, where: str, name: str) -> BuildingGraph:
 
     `where`: what messages begin with; `name`: name of a building that has none. Returns floors in
     the order of the file, in its one frame. Edges between two floors become links between their
-    nodes: those of one `edgeName` one link, of the kind with which that begins, or else a lift.
-    Times are not stated. Raises `MapError` when it is not of this form.
+    nodes: those of one `edgeName` one link, of the kind with which that begins, or else a lift, one
+    way if none of them leads back. Times are not stated. Raises `MapError` when it is not of this
+    form.
     """
     data = _parsed(text, where)
     floors: dict[str, Gathered] = {}
@@ -175,17 +177,23 @@ def links_between(
     """Return a link for the edges of each name."""
     place = {floor: at for at, floor in enumerate(floors)}
     stops: dict[str, dict[str, Point]] = {}
+    is_up: dict[str, set[bool]] = {}
     for name, *ends in crossing:
-        for end in ends:
-            if floor_of[end] in place and end in point_of:
-                stops.setdefault(name, {}).setdefault(floor_of[end], point_of[end])
+        known = [end for end in ends if floor_of[end] in place and end in point_of]
+        for end in known:
+            stops.setdefault(name, {}).setdefault(floor_of[end], point_of[end])
+        if len(known) > 1:
+            tail, head = (place[floor_of[end]] for end in known)
+            is_up.setdefault(name, set()).add(tail < head)
     stops = {name: points_on for name, points_on in stops.items() if len(points_on) > 1}
     own_names = _own_names(list(stops))
     links = []
     for name, points_on in stops.items():
         ordered = sorted(points_on, key=place.__getitem__)
-        known = tuple(LinkEnd(floor, points_on[floor]) for floor in ordered)
-        links.append(Link(name=own_names[name], kind=_split(name)[0] or "lift", ends=known))
+        stopped = tuple(LinkEnd(floor, points_on[floor]) for floor in ordered)
+        kind, ways = _split(name)[0] or "lift", is_up.get(name, set())
+        one_way = DIRECTIONS[ways == {False}] if len(ways) == 1 else None
+        links.append(Link(name=own_names[name], kind=kind, ends=stopped, one_way=one_way))
     return links
 
 
@@ -222,7 +230,7 @@ def export_lif(
     The file is that of the guideline "LIF - Layout Interchange Format", version 1.0.0 of March 2024
     (VDMA), as the schema of ConstantinUp/LIF_Schema has it. There is a layout for each floor, with
     `layoutLevelId`, and a node for each node, with the floor as `mapId` and its name as `nodeName`.
-    Each edge is an edge. A link is edges from floor to floor, both ways, whose `edgeName` is its
+    Each edge is an edge. A link is edges from floor to floor, as it leads, whose `edgeName` is its
     kind and name: "the end node can be located in another layout". Rooms are no stations, and there
     are none.
 
@@ -323,9 +331,7 @@ def _lif_out_layouts(building: BuildingGraph, types: list[str]) -> list[dict[str
         )
     at = {floor.name: number for number, floor in enumerate(building.floors)}
     for link in building.links:
-        stops = nodes_of_link(building, link)
-        pairs = list(itertools.pairwise(stops))
-        for one, other in [*pairs, *(pair[::-1] for pair in pairs)]:
+        for one, other in rides_between(building, link):
             ends = ids[one[0].name][0][one[1]], ids[other[0].name][0][other[1]]
             edge = {"edgeId": f"{link.kind}/{link.name}/{one[0].name}/{other[0].name}"}
             edge |= {"edgeName": f"{link.kind} {link.name}"}

@@ -25,6 +25,7 @@ from hybridnav.ext.fleet import (
 from hybridnav.ext.fleet.files import osm_xml as osm
 from hybridnav.ext.fleet.files.osm_write import ALONE, ID, ID_BACK
 from hybridnav.ext.fleet.files.rmf_read import MOST_FLOORS, check_link_count, id_fact
+from hybridnav.ext.fleet.links import DIRECTIONS, Direction
 from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Findings, Gathered, free_name, number_of, shown
 
@@ -33,8 +34,9 @@ Point = tuple[float, float]
 _VERTICAL: dict[str, LinkKind] = {"elevator": "lift", "stairs": "stairs"}
 """Values of `osmAG:areaType` that join levels."""
 _FACTS = ("wait_s", "ride_s", "cost_m", "max_radius_m")
+_ALONG = {"yes": 1, "true": 1, "1": 1, "forward": 1, "-1": -1, "backward": -1}
+"""Values of `oneway` and `conveying`: along the line, or back."""
 _KM_H = 3.6
-"""Decimals of metres."""
 
 
 @dataclass
@@ -170,13 +172,18 @@ def _add_routes(
         speed = number_of(facts.get("maxspeed"))
         if speed > 0:
             facts["speed_limit"] = round(speed / _KM_H, 6)
-        one_way = way.tags.get("oneway", "no")
+        along = _along(way)
         ahead, back = (facts | id_fact(way.tags.get(key, "")) for key in (ID, ID_BACK))
         for pair in itertools.pairwise(way.refs):
-            if one_way != "-1":
+            if along >= 0:
                 gathered.add_edge(pair, ahead)
-            if one_way not in {"yes", "true", "1"}:
+            if along <= 0:
                 gathered.add_edge(pair[::-1], back)
+
+
+def _along(line: osm.OsmWay) -> int:
+    """Return 1 for a line that is taken along itself alone, -1 back alone, 0 for both ways."""
+    return _ALONG.get(line.tags.get("oneway", line.tags.get("conveying", "")), 0)
 
 
 def _is_room(element: osm.OsmWay) -> bool:
@@ -257,8 +264,10 @@ class _Links:
         for way in self._data.ways:
             kind = osm.link_kind(way.tags, is_line=not way.is_closed)
             if kind is not None and len(osm.levels_of(way.tags)) > 1:
+                served = self._served_levels(way)
+                one_way = None if way.is_closed else self._direction(way, served)
                 links.append(
-                    self._link(way.tags.get("name", ""), kind, self._served_levels(way), way.tags)
+                    self._link(way.tags.get("name", ""), kind, served, way.tags, one_way=one_way)
                 )
                 if kind != "lift":
                     self._note(links[-1], kind, f"way {way.id}")
@@ -268,6 +277,14 @@ class _Links:
             elif kind == "stairs" and not osm.levels_of(way.tags):
                 self._note_astray(way)
         return links
+
+    def _direction(self, line: osm.OsmWay, served: list[tuple[float, Point]]) -> Direction | None:
+        """Return the one direction in which a line is taken, as an escalator is; None for both."""
+        points = [self._points.get(node) for node in line.refs]
+        levels = [level for level, _ in sorted(served, key=lambda each: points.index(each[1]))]
+        if not _along(line) or len(levels) < 2:  # noqa: PLR2004
+            return None
+        return DIRECTIONS[(levels[0] < levels[-1]) != (_along(line) > 0)]
 
     def _note_astray(self, line: osm.OsmWay) -> None:
         """Note steps without a level, which are read as a way of level 0, beside other levels."""
@@ -342,7 +359,13 @@ class _Links:
             self.findings.add("link-unread", f"{kind}, {where}")
 
     def _link(
-        self, name: str, kind: LinkKind, points: list[tuple[float, Point]], tags: dict[str, str]
+        self,
+        name: str,
+        kind: LinkKind,
+        points: list[tuple[float, Point]],
+        tags: dict[str, str],
+        *,
+        one_way: Direction | None = None,
     ) -> Link | None:
         """Return a link, None if it stops at fewer than two levels."""
         ends: dict[float, LinkEnd] = {}
@@ -356,7 +379,7 @@ class _Links:
         check_link_count(len(self._taken), self._where)
         given = {key: number_of(tags.get(f"hybridnav:{key}")) for key in _FACTS}
         figures = {key: value for key, value in given.items() if value > 0}
-        return Link(name=own, kind=kind, ends=tuple(ends.values()), **figures)
+        return Link(name=own, kind=kind, ends=tuple(ends.values()), one_way=one_way, **figures)
 
 
 # The graph of rooms and doors that have no ways between them.

@@ -45,8 +45,9 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
       Standard" and `OsmAGExporter.cpp` (jiajiezhang7/osmAG-from-cad).
     * Edges are ways with `highway=footway`, `indoor=yes`, and `oneway=yes` where no edge leads
       back.
-    * Links are ways through their ends with `highway` elevator, steps or footway and all levels in
-      `level`. On each floor they are an area with a passage to the room around.
+    * Links are ways through their ends from the lowest to the highest, with `highway` elevator,
+      steps or footway, all levels in `level`, and `oneway` where they lead one way. On each floor
+      they are an area with a passage to the room around.
 
     Other facts of a `Link`, the name of an edge's door, and the ids of nodes and edges that are
     whole numbers have keys that begin with `hybridnav:`.
@@ -220,23 +221,25 @@ class _Writer:
         self, link: Link, shapes: dict[str, Shapes], way_of: dict[str, dict[str, int]]
     ) -> None:
         stops = nodes_of_link(self._building, link)
+        way = [self._graph_nodes[floor.name][node] for floor, node in stops]
         levels = ";".join(self._levels[floor.name] for floor, _ in stops)
         tags = {"highway": _HIGHWAYS[link.kind], "indoor": "yes", "name": link.name}
         tags |= {"level": levels, "hybridnav:link": link.kind}
+        tags |= {None: {}, "up": {"oneway": "yes"}, "down": {"oneway": "-1"}}[link.one_way]
         for key in ("wait_s", "ride_s", "cost_m", "max_radius_m"):
             value = float(getattr(link, key))
             if value and math.isfinite(value):
                 tags[f"hybridnav:{key}"] = repr(value)
-        self._add_way([self._graph_nodes[floor.name][node] for floor, node in stops], tags)
+        self._add_way(way, tags)
         areas = []
-        for floor, node in stops:
+        for (floor, node), own_node in zip(stops, way, strict=True):
             middle = tuple(floor.graph.points[node].tolist())
             refs = [self._node(point, {}) for point in cabin_corners(middle, link.max_radius_m)]
             own = {"indoor": "room", "name": link.name, "osmAG:areaType": AREA_TYPES[link.kind]}
             mark = {"hybridnav:link": link.kind}
             own |= {"osmAG:type": "area"} | mark | self._raised(floor)
             area = self._add_way([*refs, refs[0]], own)
-            areas.append((floor, area, self._graph_nodes[floor.name][node]))
+            areas.append((floor, area, own_node))
             room = shapes[floor.name].area_at(middle)
             if room in way_of[floor.name]:
                 to = way_of[floor.name][room]

@@ -63,10 +63,11 @@ def load_building(
         `floors`, from the lowest to the highest. Each has its `name`, its `map` (a map or a model,
         relative to the file), and optionally `elevation_m`, a file of `rooms`, or `find_rooms:
         true`. A list `links` has for each its `name`, its `kind` (lift, stairs or ramp), two or
-        more `ends`, and optionally `wait_s`, `ride_s`, `cost_m` and `max_radius_m`. Optional are
-        `speed_m_s`, and `profiles`, each with its `name` and its differences from a plain
-        `Profile`. An end has a `floor`, a place, and optionally `yaw_rad`. The place is `at: [x,
-        y]`, a `room`, or the number of a `door`, with the `room` where the robot stands.
+        more `ends`, and optionally `wait_s`, `ride_s`, `cost_m`, `max_radius_m` and `one_way` (up
+        or down). Optional are `speed_m_s`, and `profiles`, each with its `name` and its differences
+        from a plain `Profile`. An end has a `floor`, a place, and optionally `yaw_rad`. The place
+        is `at: [x, y]`, a `room`, or the number of a `door`, with the `room` where the robot
+        stands.
     robot_radius_m
         Radius of the robot in metres on all floors; None for that of the models, or of the preset.
     preset
@@ -206,7 +207,8 @@ def _link(entry: LinkEntry, floors: dict[str, Floor]) -> Link:
     most_m = entry.numbers.get("max_radius_m", math.inf)
     ends = tuple(_end(end, floors, most_m) for end in entry.ends)
     with _at(entry.at):
-        return Link(name=entry.name, kind=entry.kind, ends=ends, **entry.numbers)
+        numbers: dict[str, Any] = entry.numbers
+        return Link(name=entry.name, kind=entry.kind, ends=ends, one_way=entry.one_way, **numbers)
 
 
 def _end(entry: EndEntry, floors: dict[str, Floor], max_radius_m: float) -> LinkEnd:

@@ -97,7 +97,9 @@ def building_of(
         stops = sorted((place[floor], floor) for floor in rmf_lift.ends if floor in place)
         if len(stops) > 1:
             ends = tuple(LinkEnd(floor, rmf_lift.ends[floor]) for _, floor in stops)
-            fits = {} if rmf_lift.dims_m is None else {"max_radius_m": min(rmf_lift.dims_m) / 2}
+            fits: dict[str, Any] = (
+                {} if rmf_lift.dims_m is None else {"max_radius_m": min(rmf_lift.dims_m) / 2}
+            )
             links.append(Link(name=lift, kind="lift", ends=ends, **fits))
         else:
             at = f"lift {shown(lift)}, vertices in its cabin on {len(stops)} levels"

@@ -279,8 +279,11 @@ def _left_out(building: BuildingGraph, *, doors: bool) -> Iterator[str]:
     for link in building.links:
         if link.kind != "lift":
             yield f"{link.kind} {link.name}: Open-RMF knows lifts only"
-        elif link.wait_s or link.ride_s or link.cost_m:
+            continue
+        if link.wait_s or link.ride_s or link.cost_m:
             yield f"lift {link.name}: its waiting time, ride time and cost"
+        if link.one_way:
+            yield f"lift {link.label}: its direction, Open-RMF takes lifts both ways"
     if not doors and any(not door.is_opening for f in building.floors for door in f.doors):
         yield "doors: as asked"
     bent = sum(len(floor.graph.lines) for floor in building.floors)

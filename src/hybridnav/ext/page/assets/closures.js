@@ -5,7 +5,7 @@ import { settings, t } from "./texts.js";
 
 const NOTHING = { doors: [], rooms: [], polygons: [], one_way: [] };
 const SAME = 1.5; // cells within which a door or a room is the one that was there before
-const KEY = /^(?:link:(?<links>.+)|(?:(?<floor>.+?):)?(?:door:(?<doors>\d{1,9})|room:(?<rooms>.+)|one-way:(?<ways>(?:door|line):.+)))$/;
+const KEY = /^(?:(?:one-way:)?link:(?<links>.+)|(?:(?<floor>.+?):)?(?:door:(?<doors>\d{1,9})|room:(?<rooms>.+)|one-way:(?<ways>(?:door|line):.+)))$/;
 const WAY = /^door:(?<number>\d+)=(?<room>.*)$/;
 
 export class Closures {

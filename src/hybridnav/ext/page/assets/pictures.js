@@ -120,7 +120,7 @@ export class Pictures {
       const ride = rides.find((each) => each.link === link.name && (each.from === floors.at || each.to === floors.at));
       const isLeft = ride?.from === floors.at;
       const where = ride ? [t(isLeft ? "to-floor" : "from-floor", floors.nameOf(isLeft ? ride.to : ride.from))] : [];
-      return { kind: link.kind, at, fits: link.fits, isTaken: Boolean(ride), texts: [link.name, ...where] };
+      return { kind: link.kind, at, fits: link.fits, isTaken: Boolean(ride), texts: [link.label, ...where] };
     });
   }
 
