@@ -3,9 +3,10 @@
 The robot is a disc, or a point. Its centre moves over the *free* cells of a map: they were measured
 as free, the proof does not close them, and no occupied cell is within the radius, from centre to
 centre. All others, and the outside, are *walls*: it may touch them, but not enter them, nor pass
-between two that meet at a corner. Accepted means: the path of the proof is free, it costs what is
-stated, and none costs less than the stated bound, to 1 part in 10^9 (or 10^-6 of a cell, to which
-ends are rounded that are no centres). The rest is decided in whole numbers.
+between two that meet at a corner. An end on a side is in the cell above, or to the right. Accepted
+means: the path of the proof is free, it costs what is stated, and none costs less than the stated
+bound, to 1 part in 10^9 (or 10^-6 of a cell, to which ends are rounded that are no centres). The
+rest is decided in whole numbers.
 MAP is a MovingAI map, or a YAML file of ROS that names a PGM image of 8 bits; the proof must be
 about that map. It reads lines `KEY: VALUE # COMMENT` of YAML: VALUE is a plain text, a text in
 quotes without backslashes, or a list [x, y, yaw], also below as lines `- x`. What stands below
@@ -15,7 +16,6 @@ other keys is skipped. Exits with 0 if the proof is accepted, 1 if not, 2 if a f
 import base64
 import cmath
 import hashlib
-import itertools
 import json
 import math
 import re
@@ -87,9 +87,8 @@ def read_map(path, thresholds):
     is_pgm = head and value["mode"].lower() in ("", "trinary", "scale")
     need(is_pgm, "no PGM of 8 bits, trinary or scale: write the map as one", ValueError)
     kind, cols, rows = map(int, head.groups())
-    pixels = np.frombuffer(data, np.uint8, offset=head.end())
-    pixels = np.array(data[head.end() :].split(), int) if kind == 2 else pixels
-    need((pixels >= 0).all(), "a grey is negative", ValueError)
+    greys = data[head.end() :]
+    pixels = np.frombuffer(greys if kind == 5 else bytes(map(int, greys.split())), np.uint8)
     level, (low, high) = np.arange(256, dtype=np.float32) / np.float32(255), np.float32(thresholds)
     occupancy = level if NEGATE[value["negate"].lower()] else 1 - level
     kinds = np.where(occupancy <= low, 1, np.where(occupancy >= high, 0, 2)).astype(np.uint8)
@@ -114,9 +113,8 @@ def walls_of(measured, proof, side):
     free = (measured == 1) | (measured == 2) & (proof["allow_unexplored"] is True)
     radius = proof["radius_m"] / side
     need(0 <= radius < MOST, "a radius of too many cells, or none")
-    if radius >= 1:
-        most = math.floor(radius * radius * (1 + 1e-9))
-        free &= squares(measured == 0, math.isqrt(most)) > most
+    most = math.floor(radius * radius * (1 + 1e-9))
+    free &= squares(measured == 0, math.isqrt(most)) > most
     last = -1
     for first, end in proof["closed"]:
         need(last < first < end <= free.size, "a closed cell is outside the map, or closed twice")
@@ -149,11 +147,9 @@ def factors_of(measured, costs, side):
         return np.full(np.add(measured.shape, 2), ONE)
     reach = math.ceil(costs["inflation_radius_m"] / side)
     need(0 <= reach < MOST, "costs that reach too far")
-    cost = np.zeros(reach * reach + 2 * reach + 2)
-    for n in range(reach * reach + 1):
-        off = math.sqrt(n) * side - costs["inscribed_radius_m"]
-        cost[n] = 253 if off <= 0 else math.floor(252 * math.exp(-costs["scaling"] * off))
-    cost[0] = 254
+    offs = [math.sqrt(n) * side - costs["inscribed_radius_m"] for n in range(reach * reach + 1)]
+    cost = [math.floor(252 * math.exp(-costs["scaling"] * off)) if off > 0 else 253 for off in offs]
+    cost = np.array([254, *cost[1:], *[0] * (2 * reach + 1)])
     factors = np.floor((1 + costs["multiplier"] / 252 * cost) * ONE).astype(np.int64)
     need((factors >= ONE).all() and (factors < 1000 * ONE).all(), "a factor is not from 1 to 1000")
     return np.pad(factors[squares(measured == 0, reach)], 1, constant_values=ONE)
@@ -170,50 +166,55 @@ def near(points):
     return np.floor(points + 1e-7 * MOVES[1::2, None]).astype(int).transpose(2, 0, 1)
 
 
-def cuts_of(first, last):
-    """Return the shares of a line, from 0 to 1, at which it enters other cells."""
-    cuts = [np.arange(math.ceil(min(p)), max(p)) for p in zip(first, last, strict=True)]
-    parts = [(cut - a) / (b - a) for cut, a, b in zip(cuts, first, last, strict=True) if a != b]
-    return np.sort(np.concatenate([[0.0, 1.0], *parts]))
+def between(first_keys, first, last_keys, last):
+    """Return the numbers from the first key at each first to the last one at last, and of which."""
+    low = np.searchsorted(first_keys, first, "left")
+    count = np.maximum(np.searchsorted(last_keys, last, "right") - low, 0)
+    of = np.repeat(np.arange(len(count)), count)
+    return of, np.arange(len(of)) - np.repeat(np.cumsum(count) - count - low, count)
 
 
-def cost_of(walls, factors, line, is_strict):
-    """Return the cost of a chain of lines, infinite where it meets a wall. Cut where it enters
-    another cell, each part lies in a free cell, or beside one; cells in a row share a side, or a
-    corner and one free cell at it; two if it is strict."""
-    cost, middles = 0.0, [line[:1]]
-    for first, last in itertools.pairwise(line):
-        parts = cuts_of(first, last)
-        lengths = np.diff(parts) * math.dist(first, last)
-        middle = first + (last - first) * (parts[1:, None] + parts[:-1, None]) / 2
-        cost += (factors[tuple(near(middle))].max(axis=0) * lengths).sum() / ONE
-        middles.append(middle[lengths > 1e-6])
-    row, col = near(np.concatenate(middles))
-    free, before = ~walls[row, col], np.maximum(np.arange(row.shape[1]) - 1, 0)
-    beside = ~walls[row, col[:, before]], ~walls[row[:, before], col]
-    by = beside[0] & beside[1] if is_strict else beside[0] | beside[1]
-    return cost if (free & free[:, before] & by).any(axis=0).all() else math.inf
+def cut(line):
+    """Return a chain of lines with the points at which it enters other cells, and their middles."""
+    number, whole = np.arange(len(line)), np.arange(line.max() + 1)
+    shares = [number]
+    for way in line.T:
+        low, high = np.minimum(way[:-1], way[1:]), np.maximum(way[:-1], way[1:])
+        of, cuts = between(whole, low, whole, np.ceil(high) - 1)
+        shares.append(of + (cuts - way[of]) / (way[of + 1] - way[of]))
+    shares = np.sort(np.concatenate(shares))
+    points = np.stack([np.interp(shares, number, way) for way in line.T], axis=1)
+    return points, (points[1:] + points[:-1]) / 2
 
 
-def follows(walls, bars, line):
-    """Return whether lines obey one-way lines: the cells that they may be in are followed."""
-    cells = before = {(row, col) for row, col in near(line[:1])[..., 0].T if not walls[row, col]}
-    for first, last in itertools.pairwise(line):
-        parts = cuts_of(first, last)
-        parts = np.sort(np.concatenate([parts, (parts[1:] + parts[:-1]) / 2]))
-        for at in near(first + (last - first) * parts[:, None]).transpose(2, 1, 0):
-            there = {(row, col) for row, col in at if not walls[row, col]}
-            for k in [0, 2, 4, 6] * 3:
-                cells = cells | {(*(MOVES[k] + c),) for c in cells if not bars[k][c]} & before
-            cells, before = cells & there, there
-    return len(cells) > 0
+def cost_of(factors, line):
+    """Return the cost of a chain of lines; beside a side, the dearer cell counts."""
+    points, middles = cut(line)
+    lengths = np.hypot(*np.diff(points, axis=0).T)
+    return (factors[tuple(near(middles))].max(axis=0) * lengths).sum() / ONE
 
 
-def check_region(walls, bars, proof, ends):
+def follows(walls, bars, line, cells):
+    """Return whether a chain of lines leads from a cell to another. The cells that it may be in are
+    followed from point to point: past walls, round corners, over one-way lines from their left."""
+    points, middles = cut(line)
+    places = near(np.insert(points, range(1, len(points)), middles, axis=0)).transpose(2, 1, 0)
+    inside = here = {tuple(cells[0].tolist())}
+    for at in [*places.tolist(), cells[1:].tolist()]:
+        ahead = {cell for cell in set(map(tuple, at)) if not walls[cell]}
+        for k in [0, 2, 4, 6] * (len(here) - 1):
+            up, right = MOVES[k].tolist()
+            after = {(row + up, col + right) for row, col in inside if not bars[k, row, col]}
+            inside = inside | after & here
+        inside, here = inside & ahead, ahead
+    return len(inside) > 0
+
+
+def check_region(walls, bars, proof, cells):
     """Check that a set of cells, bytes that are 1, has the start and not the goal, and no straight
     move leads out. Then no path does: they cross sides of cells, or go round their corners."""
     inside = np.pad(unpacked(proof["region"], np.subtract(walls.shape, 2)) == 1, 1) & ~walls
-    start, goal = map(tuple, (ends + 1e-9).astype(int))
+    start, goal = map(tuple, cells)
     need(inside[start] and not inside[goal], "the region has not the start, or has the goal")
     for k in range(0, 8, 2):
         beyond = np.roll(inside | walls, -MOVES[k], (0, 1))
@@ -227,7 +228,7 @@ def check_region(walls, bars, proof, ends):
 # cost from there to the goal on an empty map), and the same holds outside of the box of the tree.
 
 
-def check_moves(costs, ahead, proof, ends, bound, bars=None):
+def check_moves(costs, bars, ahead, proof, ends, bound):
     """Check a potential on the box of a tree with its rim, from the costs of four of the MOVES, 0
     where there is none, and the costs of moves on an empty map; return it, and the tree."""
     shape = costs.shape[1:]
@@ -248,7 +249,6 @@ def check_moves(costs, ahead, proof, ends, bound, bars=None):
     down, across = (abs(np.arange(n) - at) for n, at in zip(shape, goal, strict=True))
     least = np.maximum(down[:, None], across) * ahead[0]
     least += np.minimum(down[:, None], across) * (ahead[1] - ahead[0])
-    bars = np.zeros((8, *shape), bool) if bars is None else bars
     p = np.where(tree == 9, bound - 2 * ONE * least, back.reshape(shape))
     for k, cost in enumerate(costs):
         after, back = (np.roll(array, -MOVES[k], (0, 1)) for array in (p, bars[k + 4]))
@@ -287,7 +287,7 @@ def check_cells(walls, factors, proof, ends, bound, bars):
     """Check a potential that bounds all paths of cells; return it, and the tree."""
     costs = costs_of_cells(boxed(walls, proof), boxed(factors, proof))
     cells = np.floor(ends).astype(int) - proof["box"][:2]
-    return check_moves(costs, PLAIN, proof, cells, math.floor(bound * UNIT), boxed(bars, proof))
+    return check_moves(costs, boxed(bars, proof), PLAIN, proof, cells, math.floor(bound * UNIT))
 
 
 # A KING. By costs, take numbers a, b in each cell, the cosine and sine of a tilt times its factor.
@@ -316,12 +316,12 @@ def check_king(walls, factors, proof, ends, bound):
     """Check a potential of corners that bounds all lines by their costs."""
     corners = np.array(proof["corners"], int) + 1
     need(corners.shape == ends.shape and (abs(corners - ends) < 1).all(), "corners of other cells")
-    bound += joins_of(factors, ends, corners)
-    walls, factors = (np.pad(array, (0, 1), constant_values=1) for array in (walls, factors))
-    walls, factors = boxed(walls, proof), boxed(factors, proof)
+    bound = math.floor((bound + joins_of(factors, ends, corners)) * UNIT)
+    more = (np.pad(array, (0, 1), constant_values=1) for array in (walls, factors))
+    walls, factors = (boxed(array, proof) for array in more)
     tilts = np.pad(unpacked(proof["tilts"], np.subtract(walls.shape, 2)), 1, constant_values=LEVEL)
     costs, corners = costs_of_corners(walls, factors, tilts), corners - proof["box"][:2]
-    check_moves(costs, TILTED[:, LEVEL], proof, corners, math.floor(bound * UNIT))
+    check_moves(costs, np.zeros((8, 1, 1), bool), TILTED[:, LEVEL], proof, corners, bound)
 
 
 # STRINGS. A shortest path is a taut string: it bends at *corners* only, where one of four cells is
@@ -337,14 +337,6 @@ def check_king(walls, factors, proof, ends, bound):
 # parts, from corner to corner.
 
 
-def between(first_keys, first, last_keys, last):
-    """Return the numbers from the first key at each first to the last one at last, and of which."""
-    low = np.searchsorted(first_keys, first, "left")
-    count = np.maximum(np.searchsorted(last_keys, last, "right") - low, 0)
-    of = np.repeat(np.arange(len(count)), count)
-    return of, np.arange(len(of)) - np.repeat(np.cumsum(count) - count - low, count)
-
-
 def strings_in(walls, bars, ends, bound):
     """Return start, goal and the corners that a path below the bound may pass, p of them where none
     is stated, flat over (4, n), and what yields lit ones with what each of them sees."""
@@ -352,9 +344,10 @@ def strings_in(walls, bars, ends, bound):
     four = sum(marks[r : r - 1 or None, c : c - 1 or None] for r in (0, 1) for c in (0, 1))
     nodes = np.concatenate([ends, np.argwhere((four == 1) | (four > 7)) + 1])
     grain = 2 ** (30 - max(walls.shape).bit_length())  # products of two numbers fit into 62 bits
-    flat, far = np.rint(nodes * grain).astype(np.int64), [np.hypot(*(nodes - p).T) for p in ends]
-    kept = (flat[:, None] != flat[:2]).any(axis=2).all(axis=1) & (far[0] + far[1] < bound)
-    kept[:2] = True
+    flat, far = (nodes * grain).astype(np.int64), [np.hypot(*(nodes - p).T) for p in ends]
+    cells = np.floor(ends + 1e-9) * grain  # ends on sides are moved into their cells
+    flat[:2] = np.clip(np.rint(ends * grain), cells + 1, cells + grain - 1)
+    kept = (far[0] + far[1] < bound) | (np.arange(len(nodes)) < 2)
     nodes, (y, x), plain = nodes[kept], flat[kept].T, np.tile(bound - far[1][kept], 4)
     size, q, (height, width) = len(nodes), np.arange(4)[:, None], np.multiply(walls.shape, grain)
     at = nodes[:, 0].astype(int) - q // 2, nodes[:, 1].astype(int) - q % 2  # the four cells
@@ -464,7 +457,7 @@ def check(measured, frame, proof):
         need((ends > 1 - 1e-6).all() and (ends < walls.shape).all(), "ends outside the map")
         bars = bars_of(walls.shape, proof)
         if kind == "no path":
-            check_region(walls, bars, proof, ends)
+            check_region(walls, bars, proof, np.floor(ends + 1e-9).astype(int))
         else:
             need(kind in {"cells", "line"}, "another kind of proof")
             check_path(walls, factors_of(measured, costs, side), bars, proof, ends)
@@ -488,29 +481,25 @@ def check(measured, frame, proof):
 def check_path(walls, factors, bars, proof, ends):
     """Check a path, its cost, and the bound on all others."""
     is_cells, bound = proof["kind"] == "cells", proof["bound"] / proof["side_m"] * (1 - 1e-9)
-    if is_cells:
-        line = walk(*proof["path"])
-        is_turn = np.diff(line, 2, axis=0, prepend=line[:1] - 9, append=line[-1:] - 9).any(axis=1)
-        line = line[is_turn] + 0.5
-    else:
-        line = np.array(proof["line"], float) + 1
+    line = walk(*proof["path"]) + 0.5 if is_cells else np.array(proof["line"], float) + 1
     need((line > 1 - 1e-7).all() and (line < walls.shape).all(), "the path leaves the map")
-    steps = np.hypot(*np.diff(line, axis=0).T)
-    need(len(line) <= 10**5 and (steps > 1e-5).all(), "steps too many or too short")
-    away = abs(line[[0, -1]] - ends) - 0.5 * is_cells  # anywhere in a cell
-    need((away <= 1e-6).all(), "the ends are not start and goal")
-    cost = cost_of(walls, factors, line, is_cells) * proof["side_m"]
-    need(cost < math.inf, "the path meets a wall")
-    need(not bars.any() or follows(walls, bars, line), "the path crosses a side the wrong way")
+    need(len(line) + abs(np.diff(line, axis=0)).sum() < 10**6, "a path over too many cells")
+    cells = np.floor(ends + 1e-9).astype(int)
+    stated, ends = cells + 0.5 if is_cells else ends, line[[0, -1]]
+    need((abs(ends - stated) <= 1e-6).all(), "the ends are not start and goal")
+    need(follows(walls, bars, line, cells), "the path meets a wall, or a side from its wrong side")
+    cost = cost_of(factors, line) * proof["side_m"]
     spare = 1e-9 * cost + 1e-7 * proof["side_m"]
     need(abs(cost - proof["cost"]) <= spare, f"the path costs {cost:.9f} m")
     need(0 <= proof["bound"] <= cost + spare, "the bound is above the cost")
     if is_cells:
-        check_cells(walls, factors, proof, line[[0, -1]], bound, bars)
-    elif bound > math.dist(*line[[0, -1]]) and proof["costs"] is None:
-        check_strings(walls, bars, proof, line[[0, -1]], bound)
-    elif bound > math.dist(*line[[0, -1]]):  # as no factor is below 1
-        check_king(walls, factors, proof, line[[0, -1]], bound)
+        (row, col), (to_row, to_col) = line[:-1].astype(int).T, line[1:].astype(int).T
+        need(not (walls[row, to_col] | walls[to_row, col]).any(), "a wall beside a diagonal move")
+        check_cells(walls, factors, proof, ends, bound, bars)
+    elif bound > math.dist(*ends) and "heights" in proof:  # of lengths, which no cost is below
+        check_strings(walls, bars, proof, ends, bound)
+    elif bound > math.dist(*ends):
+        check_king(walls, factors, proof, ends, bound)
 
 
 def main(arguments):

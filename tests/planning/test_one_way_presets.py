@@ -1,5 +1,7 @@
 """Every preset obeys directions, as an oracle knows that has no code of it; see `tests.one_way`."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,18 @@ def test_robot_starts_and_ends_in_the_cells_of_its_ends(seed):
     scene = random_scene(seed)
     assert scene is not None
     assert not list(faults(scene, "robot"))
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_ends_at_corners_of_walls_lie_in_the_cell_beyond(preset):
+    """Without directions too: where two walls meet, the other cell there is not reached."""
+    for seed in range(examples(60, 1_000)):
+        rng = np.random.default_rng(seed)
+        free = rng.random(rng.integers(2, 7, 2)) > rng.choice([0.2, 0.35, 0.5])
+        cells = np.argwhere(free)[rng.permutation(free.sum())[:3]].tolist()
+        ends = [((row, col), (Fraction(row), Fraction(col))) for row, col in cells]
+        scene = Scene(free, np.empty((0, 4), np.int32), ends)
+        assert not list(faults(scene, preset))
 
 
 def test_shortest_answers_many_pairs_and_tables_as_it_answers_each():

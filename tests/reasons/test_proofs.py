@@ -3,6 +3,7 @@
 import base64
 import io
 import json
+import math
 import pickle
 import re
 import subprocess
@@ -83,9 +84,7 @@ def test_ends_on_the_corners_of_cells_beside_walls_are_proved(preset):
         turned = random_grid(rng)
         grid = hn.OccupancyGrid(turned.probability, hn.Frame(0.05), robot_radius_m=0)
         free = grid.enterable()
-        # Not between two blocked cells that meet there, with free ones on both sides.
-        walled = ~(np.roll(free, 1, 0) | np.roll(free, 1, 1) | np.roll(free, (1, 1), (0, 1)))
-        cells = np.argwhere(free & walled)
+        cells = np.argwhere(free)
         planner = planner_of(grid, preset)
         for pair in rng.choice(len(cells), (8, 2)):
             ends = np.round(cells[pair][:, ::-1] * 0.05, 2)
@@ -115,15 +114,23 @@ def test_a_bound_above_the_cost_is_no_proof(preset):
         assert bound > cost
 
 
-def test_an_end_between_two_walls_that_meet_may_lie_in_either_cell():
+@pytest.mark.parametrize("preset", PRESETS)
+def test_an_end_between_two_walls_that_meet_lies_in_the_cell_beyond(preset):
+    """It touches another one, out of which there is a shorter path, or one at all."""
     free = np.ones((6, 6), bool)
     free[3, [1, 3]] = free[2, 4] = False  # the start is the corner of two of them
-    planner = planner_of(occupancy_grid(free.astype(np.uint8)), "shortest")
-    result = planner.plan((4.0, 3.0), (2.0, 1.0))
-    proof = hn.prove(result)
-    assert is_accepted(planner.grid, proof)
-    assert proof["bound"] == pytest.approx(np.sqrt(8))
-    assert proof["bound"] < result.cost
+    cut_off = free.copy()
+    cut_off[[3, 4], [5, 4]] = False
+    short = {"kind": "line", "line": [[3.0, 4.0], [1.0, 2.0]], "bound": 2.0, "heights": []}
+    for each in free, cut_off:
+        planner = planner_of(occupancy_grid(each.astype(np.uint8)), preset)
+        result = planner.plan((4.0, 3.0), (2.0, 1.0))
+        proof = hn.prove(result)
+        assert result.solved == (each is free)
+        assert is_accepted(planner.grid, proof)
+        assert not is_accepted(planner.grid, proof | short | {"cost": math.sqrt(8), "costs": None})
+        if preset == "shortest":
+            assert proof.get("bound", math.inf) == pytest.approx(result.cost, abs=1e-12)
 
 
 def forged(proof, grid, rng):

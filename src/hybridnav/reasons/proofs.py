@@ -198,9 +198,8 @@ def _line_by_costs(problem: _Problem) -> dict[str, Any]:
     # An end on a side may lie a rounding error beyond it, where another cell is blocked.
     line[[0, -1]] = np.clip(line[[0, -1]], cells, cells + 1)
     line = _distinct(line)
-    walls = np.pad(~problem.free, 1, constant_values=True)
     units = np.pad(layer.units, 1, constant_values=ONE)
-    cost = cost_of(walls, units, line + 1, False) * per_cell
+    cost = cost_of(units, line + 1) * per_cell
     # The corners of the cells of the ends that lie furthest from the other end.
     ahead = line[[0, -1]] - line[[1, -2]] if len(line) > 1 else np.zeros((2, 2))
     corners = np.where(ahead > 0, np.ceil(line[[0, -1]]), np.floor(line[[0, -1]])).astype(np.int64)
@@ -227,11 +226,11 @@ def _line(problem: _Problem) -> dict[str, Any]:
     line = _distinct(problem.grid.frame.positions_of(result.path.points))
     per_cell = problem.grid.resolution_m
     near, lines = result.lower_bound / per_cell * (1 - 1e-9), problem.stated["one_way"]
-    heights, bound = strings_near(problem.free, line[[0, -1]], near, lines)
+    heights, _ = strings_near(problem.free, line[[0, -1]], near, lines)
     return {
         "kind": "line",
         "cost": result.cost,
-        "bound": result.lower_bound if bound == near else bound * per_cell,
+        "bound": result.lower_bound,
         "line": line.tolist(),
         "heights": heights,
     }

@@ -235,7 +235,10 @@ def strings_near(
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)
     walls = np.pad(~free[low[0] : high[0], low[1] : high[1]], 1, constant_values=True)
     inside = ends - low + 1
-    if one_way or (ends % 1 == 0).all(axis=1).any():  # an end may lie in several cells
+    corners = np.rint(inside).astype(np.int64)
+    is_corner = (abs(inside - corners) < 1e-6).all(axis=1)  # noqa: PLR2004
+    # There an end is in one of several cells.
+    if one_way or any(walls[r - 1 : r + 1, c - 1 : c + 1].any() for r, c in corners[is_corner]):
         bars = bars_of(np.add(free.shape, 2), {"one_way": one_way})[::2]
         part = np.s_[:, low[0] : high[0] + 2, low[1] : high[1] + 2]
         found, bound_cells = _directed_strings(walls, bars[part], inside, bound_cells)

@@ -12,7 +12,7 @@ from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import keep_last
-from hybridnav._base.typing import FloatArray, LongArray
+from hybridnav._base.typing import AnyArray, FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import Box
 from hybridnav.maps.costs import CostLayer, cost_along
@@ -21,6 +21,7 @@ from hybridnav.planning.methods.grid import KnownMap
 from hybridnav.planning.settings import CheapestSettings
 from hybridnav.refine import CostLine
 from hybridnav.refine.one_way import obeys, shorten
+from hybridnav.search.directed import DirectedSides
 from hybridnav.search.found import ClosedCells, Found, MapChange, Method, Metric, PlanStats, Query
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.lattice import LatticeSearch, build_lattice
@@ -129,6 +130,7 @@ class OverLattice(Method):
         positions = line.settle(found.positions)
         seconds["settle"] = clock() - now
         points = line.in_metres(positions, *query.points)
+        query = _held_to_cells(query, line.free, (first, last))
         if not obeys(line, query, points):
             cells = self._cells_of_line(query)
             if cells is None:
@@ -145,7 +147,7 @@ class OverLattice(Method):
 
     def _cells_of_line(self, query: Query) -> LongArray | None:
         """Return the cheapest path of cells, None for none: along it a line is led that obeys
-        directions, where that over the lattice does not."""
+        directions and begins and ends in its cells, where that over the lattice does not."""
         if self._cells is None:
             free = self._line.free.view(np.bool_)
             self._cells = GridSearch(free, units=self._layer.units)
@@ -176,6 +178,20 @@ class OverLattice(Method):
             lattice = self.prepare().lattice.renewed(line.free, line.factors, shut)
             found = keep_last(self._around, closed, (LatticeSearch(lattice), line), _KEPT)
         return found
+
+
+def _held_to_cells(query: Query, free: AnyArray, ends: tuple[tuple[float, float], ...]) -> Query:
+    """Return a query whose line has to begin and end in its cells, as if sides had directions.
+
+    A corner at which two blocked cells meet lies in two cells that do not lead to each other there,
+    and the lattice sees out of both. `free`: (rows, cols); `ends`: (row, col), on the grain.
+    """
+    for (row, col), end in zip(query.cells, ends, strict=True):
+        is_corner = row and col and end == (row, col) and query.one_way is None
+        if is_corner and free[row - 1, col - 1] and not free[row - 1, col] | free[row, col - 1]:
+            none = ClosedCells(np.empty(0, np.int64), None, DirectedSides.of([], free.shape))
+            return query._replace(closed=none if query.closed is None else query.closed | none)
+    return query
 
 
 def cells_passed(query: Query, line: CostLine, points: FloatArray) -> LongArray:
