@@ -13,7 +13,7 @@ from scipy import ndimage
 import hybridnav as hn
 from benchmarks.common import print_head, print_row
 from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray
-from hybridnav.rooms import carry_names
+from hybridnav.rooms import CarriedNames, carry_names
 from hybridnav.rooms.find import judged_rooms
 from hybridnav.rooms.listing import kinds_of
 from hybridnav.rooms.merging import Forest
@@ -182,12 +182,64 @@ def _measured(grid: hn.OccupancyGrid) -> tuple[hn.RoomLabels, float, float, floa
     return found, edt, own, size
 
 
+NAMES_MAPS = (
+    ("strands/tsc_y3/tsc20160523.yaml", "strands/tsc_y4/tsc_1701.yaml"),
+    ("bwi_gdc/3ne/3ne.yaml", "bwi_gdc/sim_3ne/3ne.yaml"),
+    ("bwi_gdc/3/3.yaml", "bwi_gdc/3ne/3ne.yaml"),
+    ("giraff_homes/UMA_236.yaml", "giraff_homes/UMA_236_237.yaml"),
+    ("strands/g4s/g4s_y2.yaml", "strands/g4s/g4s_sim_cropped.yaml"),
+    ("fetch_maps/4_26_15.yaml", "fetch_maps/3_1_16_localization.yaml"),
+    ("fetch_maps/3_1_16_localization.yaml", "fetch_maps/9_16_15.yaml"),
+)
+"""Maps of one building; names are carried there and back."""
+
+
 def names_table(data: Path) -> None:
-    """Print what becomes of the names of one site in the next year, by the judge of the package."""
-    print("\n## Names of tsc_y3 on tsc_y4\n")
-    names = "tsc_y3/tsc20160523.yaml", "tsc_y4/tsc_1701.yaml"
-    old, new = (hn.load_map(data / "strands" / name, robot_radius_m=0) for name in names)
-    carried = carry_names(hn.find_rooms(old), old, hn.find_rooms(new), new)
-    n_kept = len(carried.rooms) - len(carried.undecided) - len(carried.lost)
-    print_head("rooms", "carried", "undecided", "lost")
-    print_row(len(carried.rooms), n_kept, len(carried.undecided), len(carried.lost))
+    """Print what becomes of names on another map of the building, by the judge of the package."""
+    print("\n## Names on another map\n")
+    print(
+        "`plain`: without another cut of the new rooms. `wrong`: a name is carried though less "
+        "than 0.4 of the old room, moved as a whole, or of the new one is in both.\n"
+    )
+    print_head("from", "to", "rooms", "undecided, plain", "carried", "undecided", "lost", "wrong")
+    for pair in (pair[::step] for pair in NAMES_MAPS for step in (1, -1)):
+        (old, grid), (new, new_grid) = (
+            (hn.find_rooms(grid), grid)
+            for grid in (hn.load_map(data / name, robot_radius_m=0) for name in pair)
+        )
+        plain = carry_names(old, grid, new, new_grid, recut=False)
+        carried = carry_names(old, grid, new, new_grid)
+        wrong = [n for n, fate in carried.rooms.items() if fate.status == "carried"]
+        wrong = [n for n in wrong if _common(n, (old, grid), (carried, new_grid)) < _LEAST_COMMON]
+        n_kept = len(carried.rooms) - len(carried.undecided) - len(carried.lost)
+        print_row(
+            *(*pair, len(carried.rooms), len(plain.undecided), n_kept),
+            *(len(carried.undecided), len(carried.lost), len(wrong)),
+        )
+
+
+_LEAST_COMMON = 0.4
+
+
+def _common(
+    name: str,
+    old: tuple[hn.RoomLabels, hn.OccupancyGrid],
+    new: tuple[CarriedNames, hn.OccupancyGrid],
+) -> float:
+    """Return the share that an old room and the one of its name have in common, of the larger."""
+    (rooms, grid), (carried, new_grid) = old, new
+    assert carried.transform is not None  # noqa: S101 - else no name is carried
+    own = (rooms.label_of == rooms.index(name)) & (grid.measured == hn.CellClass.FREE)
+    is_free = new_grid.measured == hn.CellClass.FREE
+    other = (carried.labels.label_of == carried.labels.index(name)) & is_free
+    there = carried.transform.moved(grid.frame.points_of(np.argwhere(own)))
+    back = carried.transform.inverse.moved(new_grid.frame.points_of(np.argwhere(other)))
+    shares = []
+    for points, mask, of, on in (
+        (there, other, is_free, new_grid),
+        (back, own, grid.measured == hn.CellClass.FREE, grid),
+    ):
+        cells = on.frame.cells_of(points)
+        cells = cells[((cells >= 0) & (cells < on.shape)).all(axis=1)]
+        shares.append(mask[tuple(cells.T)].sum() / max(1, of[tuple(cells.T)].sum()))
+    return float(min(shares))

@@ -165,7 +165,8 @@ def test_names_carried_there_and_back_are_those_before(office, cropped):
     assert len(again) >= 0.9 * len(kept)
 
 
-def test_a_room_that_is_divided_is_listed_and_its_name_given_to_no_part(office):
+def test_a_room_that_a_person_divides_is_listed_and_its_name_given_to_no_part(office):
+    """Without a wall, found rooms are joined as they were."""
     rooms, grid = office
     label_of = rooms.label_of.copy()
     cells = np.argwhere(label_of == 0)
@@ -174,11 +175,97 @@ def test_a_room_that_is_divided_is_listed_and_its_name_given_to_no_part(office):
     left = cells[cells[:, 1] < np.quantile(cells[:, 1], 0.34)]
     label_of[tuple(left.T)] = len(rooms.names) + 1
     new = hn.RoomLabels((*rooms.names, "annex", "store"), label_of)
-    carried = carry_names(rooms, grid, new, grid)
+    joined = carry_names(rooms, grid, new, grid)
+    assert joined.undecided == ()
+    assert np.array_equal(joined.labels.label_of, rooms.label_of)
+    assert joined.rooms["kitchen"].reason == "cut as before: kitchen, annex, store"
+    carried = carry_names(rooms, grid, new, grid, recut=False)
     assert carried.rooms["kitchen"].new is None
     assert carried.undecided == ("kitchen",)
     assert "annex" in carried.rooms["kitchen"].reason
     assert "kitchen" not in carried.labels.names
+
+
+BOXES_M = {
+    "hall": (0, 4, 20, 8),
+    "lab": (0, 0, 9, 4),
+    "shop": (9, 1, 16, 4),
+    "den": (0, 8, 6, 11),
+    "store": (12, 8, 20, 13),
+}
+"""Left, low, right and high side of each room of a floor, in metres; walls have 0.2 m."""
+DOORS_M = (4, 3.9, 5, 4.1), (13, 3.9, 14, 4.1), (3, 7.9, 4, 8.1), (14, 7.9, 15, 8.1)
+
+
+def drawn(free=DOORS_M, walls=(), cuts=(), joined=()):
+    """The floor, with boxes that are free in its walls, and walls in its rooms. Its rooms, some cut
+    off from an x on under a name of their own, others joined."""
+    cells, label_of = np.full((300, 440), 0.5, np.float32), np.full((300, 440), -1)
+
+    def box(where, in_m=0.0):
+        left, low, right, high = (round(20 * each) + 20 for each in where)
+        inside = round(20 * in_m)
+        return np.s_[low + inside : high - inside, left + inside : right - inside]
+
+    for name, (at, where) in zip(BOXES_M, enumerate(BOXES_M.values()), strict=True):
+        cells[box(where, in_m=-0.1)] = 1
+        label_of[box(where)] = list(BOXES_M).index(joined[0]) if name in joined else at
+        for x in (x for cut, x in cuts if cut == name):
+            label_of[box((x, *where[1:]))] = len(BOXES_M)
+    for where in BOXES_M.values():
+        cells[box(where, in_m=0.1)] = 0
+    for value, boxes in ((0, free), (1, walls)):
+        for where in boxes:
+            cells[box(where)] = value
+    used, dense = np.unique(label_of, return_inverse=True)
+    names = [*BOXES_M, "other"]
+    rooms = hn.RoomLabels(
+        tuple(names[at] for at in used[1:]), dense.reshape(cells.shape).astype(np.int32) - 1
+    )
+    return rooms, hn.OccupancyGrid(cells, hn.Frame(0.05), robot_radius_m=0)
+
+
+HALF_WALL = (9.9, 4, 10.1, 5.5), (9.9, 6.5, 10.1, 8)
+GONE = (8.9, 1.1, 9.1, 3.9)
+
+
+@pytest.mark.parametrize(
+    ("floor", "undecided"),
+    [
+        ({"cuts": [("hall", 8)]}, ()),
+        ({"joined": ("hall", "lab")}, ()),
+        ({"joined": ("hall", "lab", "store"), "cuts": [("hall", 12)]}, ()),
+        ({"walls": HALF_WALL}, ()),
+        ({"walls": HALF_WALL, "cuts": [("hall", 10)]}, ("hall",)),
+        ({"free": (*DOORS_M, GONE), "joined": ("shop", "lab")}, ("shop",)),
+        ({"free": (*DOORS_M, GONE), "walls": [(9.7, 1, 9.9, 4)]}, ()),
+        ({"free": [(x + 3, *y) for x, *y in DOORS_M], "joined": ("hall", "den")}, ()),
+    ],
+)
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_rooms_are_cut_as_before_unless_walls_come_or_go(floor, undecided, is_turned):
+    old, old_grid = drawn()
+    new, grid = drawn(**floor)
+    if is_turned:
+        grid, was = scanned_again(grid)
+        labels = np.where((was >= 0).all(axis=2), new.label_of[was[..., 0], was[..., 1]], -1)
+        new = hn.RoomLabels(new.names, labels)
+    carried = carry_names(old, old_grid, new, grid)
+    assert (carried.undecided, carried.lost) == (undecided, ())
+
+
+def test_doors_rules_and_uses_outlive_another_cut_and_the_file(tmp_path):
+    old, old_grid = drawn()
+    doors = {d.number: d.position for d in topology(old_grid, old).rooms.doors if not d.is_gap}
+    rules = tuple(hn.OneWayRule(number, into="hall") for number in doors)
+    old = replace(old, doors=doors, one_way=rules, uses={"shop": hn.RoomUse(private=True)})
+    new, grid = drawn(joined=("hall", "lab", "den"), cuts=[("shop", 12)])
+    carried = carry_names(old, old_grid, new, grid)
+    assert carried.lost_one_way == ()
+    hn.save_rooms(tmp_path / "rooms.yaml", carried.labels, grid)
+    again = hn.load_rooms(tmp_path / "rooms.yaml", grid)
+    assert set(again.names) == set(old.names)
+    assert (again.one_way, again.uses, set(again.doors)) == (old.one_way, old.uses, set(old.doors))
 
 
 def test_rooms_outside_of_a_crop_are_lost(office):

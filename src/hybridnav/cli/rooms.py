@@ -394,7 +394,7 @@ class Older:
     def of(
         cls,
         files: tuple[Path, Path],
-        args: MapOptions,
+        args: RoomsOptions,
         new: tuple[hn.RoomLabels, hn.OccupancyGrid],
     ) -> Older:
         """Read a file of rooms and its map, and carry the names; refuse a map that does not fit."""
@@ -408,7 +408,7 @@ class Older:
             max_cells=args.max_cells,
         )
         rooms = hn.load_rooms(files[0], before)
-        carried = carry_names(rooms, before, *new)
+        carried = carry_names(rooms, before, *new, recut=args.rooms_file is None)
         if carried.transform is None:
             raise hn.errors.RoomsError(
                 f"rooms {printable(files[0])}: no name is carried from "
@@ -434,13 +434,13 @@ class Older:
         moved = f"turned by {turn:.2f} degrees, moved by ({x:.2f}, {y:.2f}) m"
         whose = printable(self.grid.name)
         lines = [f"names      of {whose}: {' and '.join(counts)} carried; {moved}"]
-        for status in ("undecided", "lost"):
-            rooms = [
-                (name, fate.reason) for name, fate in to.rooms.items() if fate.status == status
-            ]
-            lines += [f"{status:<10} {name}: {reason}" for name, reason in rooms]
-            gone = [str(n) for n, fate in to.doors.items() if fate.status == status]
-            lines += [f"{status:<10} doors {', '.join(gone)}"] if gone else []
+        for status in ("carried", "undecided", "lost"):
+            rooms = [(n, fate.reason) for n, fate in to.rooms.items() if fate.status == status]
+            lines += [f"{status:<10} {name}: {reason}" for name, reason in rooms if reason]
+            doors = [str(n) for n, fate in to.doors.items() if fate.status == status]
+            lines += [f"{status:<10} doors {', '.join(doors)}"] * bool(
+                doors and status != "carried"
+            )
         lines += [f"new        {', '.join(to.new_rooms)}"] if to.new_rooms else []
         if to.lost_points:
             lines.append(f"lost       points {', '.join(to.lost_points)}")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.trig import hypots
-from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
+from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, OneWayRule, RoomLabels
 from hybridnav.maps.checks import checked_type
@@ -23,6 +23,7 @@ from hybridnav.rooms.doors import (
     numbered,
     one_way_that_holds,
 )
+from hybridnav.rooms.recutting import Side, recut_rooms
 from hybridnav.rooms.registering import (
     Candidate,
     Surface,
@@ -97,7 +98,7 @@ class Carried:
     status: str
     """`"carried"`, `"undecided"` or `"lost"`."""
     reason: str = ""
-    """Why it is not carried."""
+    """Why it is not carried, or which rooms of the new map, or parts of them, it is cut from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,9 +115,9 @@ class CarriedNames:
     """
 
     labels: RoomLabels = field(repr=False)
-    """The rooms of the new map with the names, points and numbers that were carried. Other rooms
-    keep theirs, or become `room-` and a number that neither map has if an old room is called so;
-    other doors have new numbers."""
+    """The rooms of the new map, cut as the old ones, with the names, points and numbers that were
+    carried. Other rooms keep theirs, or become `room-` and a number that neither map has if an old
+    room is called so; other doors have new numbers."""
     transform: Transform | None
     """From the frame of the old map to that of the new one; None if none was found."""
     reason: str
@@ -146,16 +147,22 @@ class CarriedNames:
 
 
 def carry_names(
-    old: RoomLabels, old_grid: OccupancyGrid, new: RoomLabels, new_grid: OccupancyGrid
+    old: RoomLabels,
+    old_grid: OccupancyGrid,
+    new: RoomLabels,
+    new_grid: OccupancyGrid,
+    *,
+    recut: bool = True,
 ) -> CarriedNames:
     """Carry the names of rooms and the numbers of doors from a map to a later one.
 
     The maps may have other frames, sizes and resolutions, and show other furniture and other parts
     of the building. The walls of both are registered by a rigid transform. Then the walls of each
-    old room are moved a little more, against drift. A new room takes the name of an old one if more
-    than half of the part of either that both maps show lies in the other. All other old rooms are
-    listed. A door keeps its number if a boundary of new rooms lies within a metre of it, and both
-    rooms were carried. Within half a metre one room is enough.
+    old room are moved a little more, against drift. New rooms are joined and split as the old ones
+    were cut, unless an opening between them has become twice as wide or as narrow. A new room takes
+    the name of an old one if more than half of the part of either that both maps show lies in the
+    other. All other old rooms are listed. A door keeps its number if a boundary of new rooms lies
+    within a metre of it, and both rooms were carried. Within half a metre one room is enough.
 
     Parameters
     ----------
@@ -163,6 +170,8 @@ def carry_names(
         The rooms with names, and their map.
     new, new_grid
         The rooms of the later map, as `find_rooms` finds them, and that map.
+    recut
+        Whether to join and split the new rooms; False for rooms that a person has drawn.
 
     Returns
     -------
@@ -198,16 +207,19 @@ def carry_names(
     if found.best is None:
         return _nothing(old, old_grid, new, found.reason)
     moving = _Moving.of(old, found.best, one, other)
-    heir_of = _heirs(overlap := _Overlap.of(old, new, moving, one, other))
+    sides = Side(old, old_grid, moving.points), Side(new, new_grid, moving.back)
+    cut = _Cut.of(*sides) if recut else _Cut(new, [[name] for name in new.names], set())
+    new = cut.labels
+    heir_of = _heirs(overlap := _Overlap.of(sides[0], after := sides[1]._replace(rooms=new)))
     names, new_rooms = _names(old, new, {heir: room for room, heir in heir_of.items()})
-    rooms = _rooms(old, new, overlap, heir_of, names)
+    rooms = _rooms(old, cut, overlap, heir_of, names)
     doors, door_points, new_doors = _doors((old, old_grid), (new, new_grid), moving, heir_of)
     points = {name: moving.moved(at, old, old_grid) for name, at in old.points.items()}
     kept = {}
     for name, at in points.items():
         room = RoomLabels(names, new.label_of).at(at, new_grid)
-        is_free = new_grid.measured[_inside(new_grid, np.array([at]))[0]] == CellClass.FREE
-        if is_free.all() and is_free.size and (name not in old.names or room == name):
+        is_free = after.at(new_grid.measured, np.array([at]))[0] == CellClass.FREE
+        if is_free and (name not in old.names or room == name):
             kept[name] = at
     uses = {name: use for name, use in old.uses.items() if rooms[name].status == "carried"}
     labels = RoomLabels(names, new.label_of, kept, door_points, uses)
@@ -282,9 +294,9 @@ class _Moving(NamedTuple):
         """Return points of old rooms, -1 for none, in the new frame."""
         return turned(points - self.centre, self.angle_rad) + self.shifts_m[rooms]
 
-    def back(self, points: FloatArray) -> FloatArray:
-        """Return points of the new map in the old frame, as if none had drifted."""
-        return turned(points - self.shifts_m[-1], -self.angle_rad) + self.centre
+    def back(self, points: FloatArray, rooms: IntArray) -> FloatArray:
+        """Return points of the new map in the old frame, by the drift of old rooms, -1 for none."""
+        return turned(points - self.shifts_m[rooms], -self.angle_rad) + self.centre
 
     def moved(self, point: Point, old: RoomLabels, grid: OccupancyGrid) -> Point:
         """Return a named point in the new frame, with its room."""
@@ -306,45 +318,64 @@ class _Overlap(NamedTuple):
     """float64 (n_new,), of the area what the old map knows."""
 
     @classmethod
-    def of(
-        cls, old: RoomLabels, new: RoomLabels, moving: _Moving, one: Surface, other: Surface
-    ) -> _Overlap:
+    def of(cls, old: Side, new: Side) -> _Overlap:
         """Move the cells of the old rooms to the new map, and those of the new ones back."""
-        n_old, n_new = len(old.names), len(new.names)
-        rooms, points, cell_m2 = _cells(old, one.grid)
+        n_old, n_new = len(old.rooms.names), len(new.rooms.names)
+        rooms, points, cell_m2 = _cells(old)
         area = np.bincount(rooms, minlength=n_old) * cell_m2
-        at, inside = _inside(other.grid, moving.points(points, rooms))
-        rooms = rooms[inside]
-        known = other.grid.measured[at] != CellClass.UNEXPLORED
-        seen = np.bincount(rooms[known], minlength=n_old) * cell_m2
-        met = np.where(other.grid.measured[at] == CellClass.FREE, new.label_of[at], NO_ROOM)
-        pairs = np.bincount(rooms * (n_new + 1) + met + 1, minlength=n_old * (n_new + 1))
+        moved = old.there(points, rooms)
+        seen = np.bincount(rooms[new.is_known(moved)], minlength=n_old) * cell_m2
+        keys = rooms * (n_new + 1) + new.at(new.rooms_of, moved) + 1
+        pairs = np.bincount(keys, minlength=n_old * (n_new + 1))
         both = pairs.reshape(n_old, n_new + 1)[:, 1:] * cell_m2
-        rooms, points, cell_m2 = _cells(new, other.grid)
-        at, inside = _inside(one.grid, moving.back(points))
-        known = one.grid.measured[at] != CellClass.UNEXPLORED
-        seen_new = np.bincount(rooms[inside][known], minlength=n_new) * cell_m2
+        rooms, points, cell_m2 = _cells(new)
+        is_known = old.is_known(new.there(points, np.full(len(points), NO_ROOM, np.int32)))
+        seen_new = np.bincount(rooms[is_known], minlength=n_new) * cell_m2
         # Back without drift, a few cells more are known: a share is one at most.
         most = np.maximum(seen_new, both.sum(axis=0))
         return cls(*(each.astype(np.float64) for each in (both, area, seen, most)))
 
 
-def _cells(labels: RoomLabels, grid: OccupancyGrid) -> tuple[IntArray, FloatArray, float]:
+def _cells(of: Side) -> tuple[IntArray, FloatArray, float]:
     """Return free cells of rooms: room, middle, and the area that each stands for."""
-    cells = np.flatnonzero((grid.measured == CellClass.FREE) & (labels.label_of >= 0))
+    labels = of.rooms_of.ravel()
+    cells = np.flatnonzero(labels >= 0)
     step = max(1, len(cells) // _MOST_CELLS)
-    row, col = np.divmod(cells[::step], grid.shape[1])
-    points = grid.frame.points_of(np.stack([row, col], axis=1))
-    return labels.label_of[row, col], points, step * grid.cell_area_m2
+    at = np.stack(np.divmod(cells[::step], of.grid.shape[1]), axis=1)
+    return labels[cells[::step]], of.grid.frame.points_of(at), step * of.grid.cell_area_m2
 
 
-def _inside(
-    grid: OccupancyGrid, points: FloatArray
-) -> tuple[tuple[LongArray, LongArray], BoolArray]:
-    """Return the cells of the points that lie on a map, and which these are."""
-    row, col = grid.frame.cells_of(points).T
-    inside = (row >= 0) & (row < grid.shape[0]) & (col >= 0) & (col < grid.shape[1])
-    return (row[inside], col[inside]), inside
+class _Cut(NamedTuple):
+    """The new rooms as the older map cuts them."""
+
+    labels: RoomLabels
+    made_of: list[list[str]]
+    """The new rooms, or parts of them, of which each is made, the one with the most cells first."""
+    divided: set[str]
+    """New rooms that are in parts."""
+
+    @classmethod
+    def of(cls, old: Side, new: Side) -> _Cut:
+        """Cut the rooms; see `recut_rooms`."""
+        label_of, common = recut_rooms(old, new)
+        names, first = new.rooms.names, _first_number(old.rooms, new.rooms)
+        used, dense = np.unique(np.append(label_of, NO_ROOM), return_inverse=True)
+        made_of: dict[int, list[str]] = {at: [] for at in used[1:].tolist()}
+        for room, at in common.tolist():
+            made_of[at].append(names[room])
+        every = [*names, *(f"room-{first + k}" for k in range(len(used)))]
+        cells = dense[:-1].reshape(label_of.shape).astype(np.int32) - np.int32(1)
+        labels = RoomLabels(tuple(every[at] for at in made_of), cells, doors=new.rooms.doors)
+        of = np.bincount(common[:, 0], minlength=len(names))
+        return cls(labels, list(made_of.values()), {names[k] for k in np.flatnonzero(of > 1)})
+
+    def origin(self, room: int) -> str:
+        """Return what a room was made of, empty for a new room as it is."""
+        parts = self.made_of[room]
+        if len(parts) < 2 and not self.divided.intersection(parts):  # noqa: PLR2004
+            return ""
+        told = [f"part of {name}" if name in self.divided else name for name in parts]
+        return f"cut as before: {', '.join(told)}"
 
 
 def _heirs(overlap: _Overlap) -> dict[int, int]:
@@ -362,7 +393,7 @@ def _heirs(overlap: _Overlap) -> dict[int, int]:
 
 def _rooms(
     old: RoomLabels,
-    new: RoomLabels,
+    cut: _Cut,
     overlap: _Overlap,
     heir_of: Mapping[int, int],
     names: tuple[str, ...],
@@ -383,7 +414,9 @@ def _rooms(
         mine, its = float(of_old[room, most]), float(of_new[room, most])
         confidence = round(min(mine, its), 3)
         if room in heir_of:
-            found[name] = Carried(new.names[heir_of[room]], confidence, "carried")
+            heir = heir_of[room]
+            was = cut.made_of[heir][0]
+            found[name] = Carried(was, confidence, "carried", cut.origin(heir))
             continue
         parts = [names[at] for at in np.flatnonzero(2 * both[room] > seen_new).tolist()]
         why = f"{mine:.0%} of it lie in {names[most]}, {its:.0%} of that in it"
@@ -445,11 +478,16 @@ def _doors(
     return found, dict(sorted(numbered.items())), tuple(new_doors)
 
 
+def _first_number(old: RoomLabels, new: RoomLabels) -> int:
+    """Return the first number that no room of either map has."""
+    found = (NUMBERED.fullmatch(name) for name in (*old.names, *new.names))
+    return 1 + max((int(match[1]) for match in found if match), default=0)
+
+
 def _names(
     old: RoomLabels, new: RoomLabels, room_of: Mapping[int, int]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    numbers = [int(m[1]) for name in (*old.names, *new.names) if (m := NUMBERED.fullmatch(name))]
-    first = max(numbers, default=0) + 1
+    first = _first_number(old, new)
     names, others = list[str](), list[str]()
     for at, own in enumerate(new.names):
         if at in room_of:
