@@ -27,8 +27,8 @@ from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
 from hybridnav.search.lattice import slopes_of
 
-_ROUNDS, _LESS = 8, 1e-11
-"""Parts of a length in which distances settle in turn; cells by which one shrinks at least."""
+_LESS = 1e-11
+"""Cells by which a distance that is stated is below the one that holds without."""
 
 
 class Grid(NamedTuple):
@@ -256,19 +256,22 @@ def strings_near(
 def _directed_strings(
     walls: BoolArray, bars: BoolArray, ends: FloatArray, bound_cells: float
 ) -> tuple[list[Any], float]:
-    """Return the rows and the bound of `strings_near`: distances shrink along what sees each other,
-    until none does."""
+    """Return the rows and the bound of `strings_near`: distances in the graph of what sees what."""
+    from scipy.sparse import csr_array  # noqa: PLC0415 - other proofs do not need it
+    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
+
     nodes, plain, in_sight = strings_in(walls, bars, ends, bound_cells)
-    size, waiting = len(nodes), np.arange(len(plain)) % len(nodes) == 0
-    length = np.where(waiting, 0.0, plain)
-    while waiting.any():
-        # The nearest first, so that few are looked from twice.
-        lit = waiting & (length <= length[waiting].min() + bound_cells / _ROUNDS)
-        before = length.copy()
-        for one, two in in_sight(before, lit):
-            far = hypots(*(nodes[two % size] - nodes[one % size]).T)
-            np.minimum.at(length, two, before[one] + far)
-        waiting = waiting & ~lit | (length < before - _LESS)
+    size, straight = len(nodes), np.tile(hypots(*(nodes - ends[0]).T), 4)
+    sights = [np.stack(pair) for pair in in_sight(straight, straight < plain)]
+    tail, head = np.concatenate(sights, axis=1)
+    order = np.argsort(tail, kind="stable")
+    tail, head = tail[order], head[order]
+    far = hypots(*(nodes[head % size] - nodes[tail % size]).T)
+    first = np.searchsorted(tail, np.arange(len(plain) + 1))
+    # A pair may be there twice, which a graph of triples would add up.
+    graph = csr_array((far, head, first), shape=(len(plain), len(plain)))
+    starts = np.arange(0, len(plain), size)
+    length = np.minimum(dijkstra(graph, indices=starts, min_only=True), plain)
     corners, q = nodes[2:].astype(np.int64), np.arange(4)
     stated = (length < plain - _LESS).reshape(4, -1).any(axis=0)[2:]
     lengths = length.reshape(4, -1)[:, 2:].T
