@@ -257,21 +257,18 @@ def _directed_strings(
     walls: BoolArray, bars: BoolArray, ends: FloatArray, bound_cells: float
 ) -> tuple[list[Any], float]:
     """Return the rows and the bound of `strings_near`: distances in the graph of what sees what."""
-    from scipy.sparse import csr_array  # noqa: PLC0415 - other proofs do not need it
-    from scipy.sparse.csgraph import dijkstra  # noqa: PLC0415
+    from scipy.sparse import csgraph, csr_array  # noqa: PLC0415 - other proofs do not need it
 
     nodes, plain, in_sight = strings_in(walls, bars, ends, bound_cells)
     size, straight = len(nodes), np.tile(hypots(*(nodes - ends[0]).T), 4)
-    sights = [np.stack(pair) for pair in in_sight(straight, straight < plain)]
-    tail, head = np.concatenate(sights, axis=1)
-    order = np.argsort(tail, kind="stable")
-    tail, head = tail[order], head[order]
+    pairs = np.hstack([np.stack(pair) for pair in in_sight(straight, straight < plain)])
+    tail, head = pairs[:, np.argsort(pairs[0], kind="stable")]
     far = hypots(*(nodes[head % size] - nodes[tail % size]).T)
     first = np.searchsorted(tail, np.arange(len(plain) + 1))
     # A pair may be there twice, which a graph of triples would add up.
     graph = csr_array((far, head, first), shape=(len(plain), len(plain)))
     starts = np.arange(0, len(plain), size)
-    length = np.minimum(dijkstra(graph, indices=starts, min_only=True), plain)
+    length = np.minimum(csgraph.dijkstra(graph, indices=starts, min_only=True), plain)
     corners, q = nodes[2:].astype(np.int64), np.arange(4)
     stated = (length < plain - _LESS).reshape(4, -1).any(axis=0)[2:]
     lengths = length.reshape(4, -1)[:, 2:].T
