@@ -6,6 +6,7 @@ at most its cost, no wrong side on its path. It exits with 1 if anything is wron
 """
 
 import argparse
+import itertools
 import math
 import sys
 import time
@@ -92,18 +93,27 @@ def random_sides(rng: np.random.Generator, rows: int, cols: int) -> NDArray[np.i
 def _line(rng: np.random.Generator, rows: int, cols: int) -> list[tuple[int, ...]]:
     """Sides along a chain of corners of cells, crossed from its left to its right."""
     row, col = int(rng.integers(rows + 1)), int(rng.integers(cols + 1))
-    sides: list[tuple[int, ...]] = []
+    corners = [(row, col)]
     for _ in range(rng.integers(1, 4)):
         up, right = [(0, 1), (1, 0), (0, -1), (-1, 0)][rng.integers(4)]
         for _ in range(rng.integers(1, 5)):
-            low, across = min(row, row + up), min(col, col + right)
-            left = low - (right < 0), across - (up > 0)
-            other = low - (right > 0), across - (up < 0)
-            if all(0 <= r < rows and 0 <= c < cols for r, c in (left, other)):
-                sides.append((*left, *other))
             row, col = row + up, col + right
+            corners.append((row, col))
             if not (0 <= row <= rows and 0 <= col <= cols):
-                return sides
+                return sides_beside(corners, rows, cols)
+    return sides_beside(corners, rows, cols)
+
+
+def sides_beside(corners: list[tuple[int, int]], rows: int, cols: int) -> list[tuple[int, ...]]:
+    """Sides of cells of a map along a chain of corners, from its left to its right."""
+    sides: list[tuple[int, ...]] = []
+    for (row, col), (to_row, to_col) in itertools.pairwise(corners):
+        up, right = to_row - row, to_col - col
+        low, across = min(row, to_row), min(col, to_col)
+        left = low - (right < 0), across - (up > 0)
+        other = low - (right > 0), across - (up < 0)
+        if all(0 <= r < rows and 0 <= c < cols for r, c in (left, other)):
+            sides.append((*left, *other))
     return sides
 
 

@@ -81,7 +81,7 @@ def test_what_is_closed_is_found_once_for_named_ends(monkeypatch):
 
 @pytest.mark.parametrize(
     ("command", "reads"),
-    [("plan", True), ("view", True), ("rooms", True), ("export", False), ("check", False)],
+    [("plan", True), ("view", True), ("rooms", True), ("export", True), ("check", True)],
 )
 def test_help_says_whether_rooms_beside_the_map_are_read(cli, command, reads):
     said = " ".join(cli(command, "--help").out.replace("│", " ").split())

@@ -93,6 +93,25 @@ def test_the_edges_of_a_graph_lead_one_way(cli, map_file: Path, tmp_path: Path) 
     assert cli("plan", map_file, *BACK, *shut, "--robot-radius", "0").code == 1
 
 
+def test_a_graph_has_the_directions_of_the_rooms_beside_the_map(
+    cli, map_file: Path, tmp_path: Path
+) -> None:
+    free = map_file.parent / "free.geojson"
+    radius = ("--robot-radius", "0")
+    assert cli("export", map_file, *radius, "-o", free).code == 0
+    (map_file.parent / "rooms.yaml").write_text(ROOMS + "one_way:\n- door:1=hall\n")
+    drawn = tmp_path / "graph.geojson"
+    assert cli("export", map_file, *radius, "-o", drawn).code == 0
+    assert "edge-against" not in cli("check", map_file, drawn, *radius).out
+    against = cli("check", map_file, free, *radius)
+    assert against.code == 1
+    assert "edge-against" in against.out
+    # The graph alone states the direction.
+    (map_file.parent / "rooms.yaml").write_text(ROOMS)
+    assert length_m(cli, map_file, *BACK, "--one-way", f"graph:{drawn}") > LONGER_M
+    assert length_m(cli, map_file, *THERE, "--one-way", f"graph:{drawn}") == 8
+
+
 @pytest.mark.parametrize(
     ("rule", "words"),
     [

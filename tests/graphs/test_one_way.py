@@ -94,6 +94,20 @@ def test_what_is_written_has_one_way_edges_and_is_read_so(
     assert not found & {"edge-against", "missing-door", "one-way", "components"}
 
 
+@pytest.mark.parametrize("slant_m", [-0.4, 0.0, 0.4])
+def test_an_edge_through_a_door_shuts_the_door_wherever_its_middle_lies(slant_m: float) -> None:
+    """A line across its middle lay in the room beside the door, and paths went round its end."""
+    topology = rooms_with()
+    planner = hn.HybridPlanner(topology)
+    left, right = (4.0, 2.0), (8.0, 2.0)
+    edge = ((6.0, 2.0), (7.4, 2.0 + slant_m)), ((5.95, 2.0 + slant_m), (6.3, 2.0))
+    for ends in (*edge, *((head, tail) for tail, head in edge)):
+        rules = one_way_rules(graph_of([ends]), topology.grid)
+        there, back = (left, right) if ends[0][0] < ends[1][0] else (right, left)
+        assert planner.plan(there, back, one_way=hn.OneWay.of(rules)).cost == pytest.approx(4)
+        assert planner.plan(back, there, one_way=hn.OneWay.of(rules)).cost > 8
+
+
 def test_lanes_keep_the_directions(topology: hn.TopologicalMap, built: RouteGraph) -> None:
     assert ways(keep_right(topology, built, apart_m=0.6)) == ways(built)
 

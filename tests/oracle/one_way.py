@@ -50,10 +50,19 @@ class OneWayPlane:
         inside = 0 <= row < self.shape[0] and 0 <= col < self.shape[1]
         return inside and bool(self.crosses[step, row, col])
 
-    def cells_length(self, start: Cell, goal: Cell) -> float:
-        """Least length of moves between two cells, infinite for none."""
+    def cells_length(
+        self, start: Cell, goal: Cell, factors: NDArray[np.float64] | None = None
+    ) -> float:
+        """Least length of moves between two cells, infinite for none; with `factors` of cells, the
+        least cost: each move counts the mean of its two."""
         source, target = (row * self.shape[1] + col for row, col in (start, goal))
-        return float(dijkstra(self._moves, indices=source)[target])
+        moves = self._moves
+        if factors is not None:
+            weights = factors.ravel()
+            moves = moves.copy()
+            tails = np.repeat(np.arange(self.free.size), np.diff(moves.indptr))
+            moves.data *= (weights[tails] + weights[moves.indices]) / 2
+        return float(dijkstra(moves, indices=source)[target])
 
     @cached_property
     def _moves(self) -> csr_array:

@@ -97,8 +97,9 @@ def _change(args: ClosedOptions) -> None:
 def _check_on_map(args: ClosedOptions, items: list[OutOfOrder]) -> None:
     settings = args.settings()
     model = args.load(settings, {})
-    beside = args.map_file.parent / "rooms.yaml"
-    file = args.rooms_file or (beside if beside.is_file() else None)
-    topology = grow_topology(model, settings, {}, rooms_file=file, find_rooms=True)
+    file, map_file = args.rooms_file, args.map_file
+    topology = grow_topology(
+        model, settings, {}, rooms_file=file, find_rooms=True, map_file=map_file
+    )
     for item in items:
         item.check_on(topology)

@@ -84,14 +84,12 @@ def grow(query: TypedQuery, model: hn.Model, seconds: Seconds) -> hn.Topological
 
     They are those of a file that is named, of the model, of a file in the map's folder, or found.
     """
-    rooms_file, beside = query.args.rooms_file, query.args.map_file.parent / "rooms.yaml"
-    has_rules = beside.is_file() and b"\none_way:" in beside.read_bytes()
-    if rooms_file is None and model.rooms is None and (query.is_tour or has_rules):
-        rooms_file = beside if beside.is_file() else None
-        if rooms_file is None:
-            complain(
-                "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
-            )
+    map_file, rooms_file = query.args.map_file, query.args.rooms_file
+    needs_file = query.is_tour and rooms_file is None and model.rooms is None
+    if needs_file and not map_file.with_name("rooms.yaml").is_file():
+        complain(
+            "no rooms.yaml lies beside the map, so rooms are found; see hybridnav rooms --help"
+        )
     settings = query.settings
     if settings.planner.underlying.method == "shortest" and not model.is_filed:
         from hybridnav.planning.methods.shortest import announce_mesh  # noqa: PLC0415 - numba
@@ -105,6 +103,7 @@ def grow(query: TypedQuery, model: hn.Model, seconds: Seconds) -> hn.Topological
             seconds,
             rooms_file=rooms_file,
             find_rooms=query.is_tour,
+            map_file=map_file,
             waypoints=query.waypoints,
             closing=query.closing,
         )

@@ -108,15 +108,21 @@ def grow_topology(
     *,
     rooms_file: Path | None = None,
     find_rooms: bool = False,
+    map_file: Path | None = None,
     waypoints: Sequence[str | tuple[float, ...]] = (),
     closing: Closing | None = None,
 ) -> hn.TopologicalMap:
     """Build the pyramid of a map with the settings of a preset, unless the model has it.
 
-    Its rooms are those of a file, those of the model or, if asked for, found. Refuse names of
-    waypoints and closed rooms that these lack before, and numbers of closed doors after.
+    Its rooms are those of a file, those of the model, those of rooms.yaml beside `map_file` (if
+    rooms are asked for, or it has directions) or, if asked for, found. Refuse names of waypoints
+    and closed rooms that these lack before, and numbers of closed doors after.
     """
     grid, rooms = model.grid, model.rooms
+    if rooms_file is None and rooms is None and map_file is not None:
+        beside = map_file.with_name("rooms.yaml")
+        if beside.is_file() and (find_rooms or b"\none_way:" in beside.read_bytes()):
+            rooms_file = beside
     if rooms_file is not None:
         with stage(f"reading {rooms_file}", seconds, "rooms"):
             rooms = hn.load_rooms(rooms_file, grid)

@@ -24,6 +24,12 @@ if TYPE_CHECKING:
 
 _STEP = 0.5
 """Steps in cells by which a line across an edge is led to the walls."""
+_SHARES = np.linspace(-1.0, 2.0, 25)
+_TURNS = np.array([0.0, 0.25, -0.25, 0.5, -0.5])
+"""Places on an edge and beyond it, and slants at which a line across it is tried: aside, and so
+much along it."""
+_NARROWER = 0.8
+"""Share of the widths before and behind a place below which it is a door."""
 
 
 def against(topology: TopologicalMap, lines: Iterable[FloatArray], free: BoolArray) -> BoolArray:
@@ -39,8 +45,8 @@ def against(topology: TopologicalMap, lines: Iterable[FloatArray], free: BoolArr
 def one_way_rules(graph: WaypointGraph, grid: OccupancyGrid) -> tuple[OneWayRule, ...]:
     """Return what the edges that lead one way state of a map, as lines for a planner.
 
-    A line runs across the middle of each such edge, from wall to wall. It ends halfway to an edge
-    that leads the other way.
+    A line runs across each such edge from wall to wall, where they are nearest, as in a door; in
+    its middle if they are as near there. It ends halfway to an edge that leads the other way.
 
     Parameters
     ----------
@@ -78,31 +84,61 @@ def one_way_rules(graph: WaypointGraph, grid: OccupancyGrid) -> tuple[OneWayRule
     lengths = hypots(steps[:, 0], steps[:, 1])
     rules = []
     for edge in np.flatnonzero(is_single & (lengths > 0)).tolist():
-        along, middle = steps[edge] / lengths[edge], tails[edge] + steps[edge] / 2
-        aside = np.array([along[1], -along[0]])  # rows run upwards: the left of the edge
+        along = steps[edge] / lengths[edge]
+        at, aside, walls = _narrowest(free, tails[edge], steps[edge], along)
         others = np.flatnonzero(steps @ along < 0)
-        met = _met(middle, aside, tails[others], steps[others])
+        met = _met(at, aside, tails[others], steps[others])
         reach = [
-            min(
-                _to_wall(free, middle, sign * aside),
-                (sign * met[sign * met > 0]).min(initial=np.inf) / 2,
-            )
-            for sign in (-1, 1)
+            min(wall, (sign * met[sign * met > 0]).min(initial=np.inf) / 2)
+            for sign, wall in zip((-1, 1), walls, strict=True)
         ]
         if min(reach) > 0:
-            ends = np.stack([middle - reach[0] * aside, middle + reach[1] * aside])
+            ends = np.stack([at - reach[0] * aside, at + reach[1] * aside])
             points = np.round(grid.frame.points_of_grid(ends), 4).tolist()
             rules.append(OneWayRule(line=tuple((x, y) for x, y in points)))
     return tuple(rules)
 
 
-def _to_wall(free: BoolArray, start: FloatArray, aside: FloatArray) -> float:
-    """Return the cells from a position to the first one that is not free, and its depth."""
-    at = start + _STEP * np.arange(int(sum(free.shape) / _STEP))[:, None] * aside
+def _narrowest(
+    free: BoolArray, tail: FloatArray, step: FloatArray, along: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return where the line across an edge lies, its direction, and the cells from there to the
+    walls: against the direction, and in it."""
+    straight = np.array([along[1], -along[0]])  # rows run upwards: the left of the edge
+    slanted = straight + _TURNS[:, None] * along
+    asides = np.tile(slanted / hypots(*slanted.T)[:, None], (len(_SHARES), 1))
+    starts = tail + np.repeat(_SHARES, len(_TURNS))[:, None] * step
+    middle, most = len(_SHARES) // 2 * len(_TURNS), float(sum(free.shape))
+    for at in ([middle], slice(None)):  # elsewhere no farther than at the middle
+        walls = np.stack([_to_wall(free, starts[at], s * asides[at], most) for s in (-1, 1)])
+        most = min(most, float(walls[:, 0].sum()))
+    widths = np.where(walls.min(axis=0) > 0, walls.sum(axis=0), np.inf).reshape(-1, len(_TURNS))
+    least = np.where(np.isinf(widths).all(axis=1), 0.0, widths.min(axis=1))
+    on_it = np.flatnonzero(np.abs(_SHARES - 0.5) <= 0.5).tolist()  # noqa: PLR2004 - ends at halves
+    doors = [k for k in on_it if _is_door(least, k)] if most > 0 else []
+    best = min(doors, key=least.__getitem__) * len(_TURNS) if doors else middle
+    best += int(widths[best // len(_TURNS)].argmin()) if doors else 0
+    return starts[best], asides[best], walls[:, best]
+
+
+def _is_door(widths: FloatArray, at: int) -> bool:
+    """Return whether one comes to wider places from a place along a line, both ways."""
+    for side in (widths[:at][::-1], widths[at + 1 :]):
+        open_to = side[: (side == 0).argmax()] if (side == 0).any() else side
+        if not (widths[at] < _NARROWER * open_to).any():
+            return False
+    return True
+
+
+def _to_wall(free: BoolArray, starts: FloatArray, asides: FloatArray, most: float) -> FloatArray:
+    """Return the cells from positions, float64 (n, 2), to the first one that is not free, and its
+    depth; `most` of them are looked at."""
+    at = starts[:, None] + _STEP * np.arange(int(most / _STEP) + 2)[:, None] * asides[:, None]
     cells = np.floor(at).astype(np.int64)
-    inside = np.asarray(((cells >= 0) & (cells < free.shape)).all(axis=1), dtype=np.bool_)
+    inside = np.asarray(((cells >= 0) & (cells < free.shape)).all(axis=2), dtype=np.bool_)
     inside[inside] = free[tuple(cells[inside].T)]
-    return _STEP * int(np.argmin(inside))  # the line leaves the map
+    inside[:, -1] = False
+    return _STEP * inside.argmin(axis=1)
 
 
 def _met(start: FloatArray, aside: FloatArray, tails: FloatArray, steps: FloatArray) -> FloatArray:

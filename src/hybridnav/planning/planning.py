@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from hybridnav.planning.methods.ompl import OmplPlanner
     from hybridnav.planning.named import At
     from hybridnav.refine import CostLine
+    from hybridnav.search.directed import DirectedSides
 
 _KEEPING = ("cheapest", "shortest", "octile")
 """Methods whose paths may stay on earlier ones."""
@@ -195,6 +196,7 @@ class Planning:
         solid = closure.solid_on(self.grid) if is_solid else None
         one_way = closure.directions
         directed = None if one_way is None else one_way.on(self.grid, self.topology)
+        self._report_lost(directed)
         return ClosedCells(closure.cells_on(self.grid, self.topology), solid, directed)
 
     @cached_property
@@ -206,11 +208,15 @@ class Planning:
         from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
 
         found = directions_on(built)
+        self._report_lost(found)
+        return ClosedCells(np.empty(0, np.int64), None, found)
+
+    def _report_lost(self, directed: DirectedSides | None) -> None:
+        """Warn of lines and doors without an effect, as after an update."""
         able = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
-        for name in () if found is None else found.lost(able):  # as after an update
+        for name in () if directed is None else directed.lost(able):
             text = f"one-way {name} lies nowhere in free space, and has no effect: look at the map"
             warnings.warn(text, MapWarning, stacklevel=2)
-        return ClosedCells(np.empty(0, np.int64), None, found)
 
     @cached_property
     def smoothing(self) -> Smooth:

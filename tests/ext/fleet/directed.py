@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 
 import hybridnav as hn
-from tests.ext.fleet.scenes import Scene, charge, random_building, usable
+from tests.ext.fleet.scenes import Scene, charge, random_building
 from tests.one_way import CELLS, random_sides
 from tests.oracle.one_way import OneWayPlane
 
@@ -43,7 +43,7 @@ def floor_faults(seed: int, preset: str, *, n_queries: int = 3) -> Iterator[str]
             planes.append(OneWayPlane(free, sides))
             blocked[floor.name] = hn.Blocked(cells=np.argwhere(shut), one_way={"sides": sides})
         plan = scene.building.plan(*map(scene.named, ends), blocked=blocked)
-        least = optimum(scene, planes, spots, by_cells=preset in CELLS)
+        least = optimum(scene.building, planes, spots, by_cells=preset in CELLS)
         asked = f"building {seed}, {preset} from {spots[0]} to {spots[1]}: "
         if plan.solved != math.isfinite(least):
             yield f"{asked}{plan.status}, the optimum is {least}"
@@ -58,39 +58,56 @@ def spot_of(scene: Scene, index: int, point: Any) -> Spot:
     return index, scene.grids[index].frame.cell_of(*point)
 
 
-def optimum(scene: Scene, planes: list[OneWayPlane], ends: list[Spot], *, by_cells: bool) -> float:
-    """The least cost from one spot to another: directed lengths on floors, charges of rides."""
-    building = scene.building
+def optimum(  # noqa: PLR0913 - a question with defaults
+    building: hn.ext.fleet.Building,
+    planes: list[OneWayPlane],
+    ends: list[Spot],
+    *,
+    by_cells: bool,
+    closed: Collection[str] = (),
+    factors: Sequence[Any] = (),
+) -> float:
+    """The least cost from one spot to another: directed lengths on floors, charges of rides.
+
+    `closed`: links that are closed, `NAME`, `NAME@FLOOR`, `NAME=up`; `factors`: costs of cells.
+    """
     number = {floor.name: k for k, floor in enumerate(building.floors)}
     graph: nx.DiGraph[Spot] = nx.DiGraph()
     graph.add_nodes_from(ends)
-    for link in usable(scene, set(), stairs=True):
-        spots = [spot_of(scene, number[end.floor], end.position_m) for end in link.ends]
+    grids = [floor.planner.grid for floor in building.floors]
+    for link in building.links:
+        floors = [end.floor for end in link.ends]
+        at = [grids[number[end.floor]].frame.cell_of(*end.position_m) for end in link.ends]
+        spots = [(number[floor], cell) for floor, cell in zip(floors, at, strict=True)]
+        fits = building.robot_radius_m <= link.max_radius_m
         for (k, one), (n, two) in itertools.permutations(list(enumerate(spots)), 2):
-            if link.one_way == ("down" if k < n else "up"):
+            back = "down" if k < n else "up"
+            by = ("", f"={back}", f"@{floors[k]}", f"@{floors[n]}")
+            if not fits or link.one_way == back or {link.name + text for text in by} & set(closed):
                 continue
             weight = charge(link, k, n, building.speed_m_s)
             if weight < graph.get_edge_data(one, two, {"weight": math.inf})["weight"]:
                 graph.add_edge(one, two, weight=weight)
     for index, plane in enumerate(planes):
         spots = [spot for spot in graph if spot[0] == index]
-        closed = [spot for spot in spots if not plane.free[spot[1]]]
-        graph.remove_nodes_from(closed)
-        spots = [spot for spot in spots if spot not in closed]
-        for one, two, cells in lengths(plane, spots, by_cells=by_cells):
+        shut = [spot for spot in spots if not plane.free[spot[1]]]
+        graph.remove_nodes_from(shut)
+        spots = [spot for spot in spots if spot not in shut]
+        own = factors[index] if factors else None
+        for one, two, cells in lengths(plane, spots, own, by_cells=by_cells):
             if math.isfinite(cells):
-                graph.add_edge(one, two, weight=cells * scene.grids[index].resolution_m)
+                graph.add_edge(one, two, weight=cells * grids[index].resolution_m)
     found = nx.single_source_dijkstra_path_length(graph, ends[0])
     return float(found.get(ends[1], math.inf))
 
 
 def lengths(
-    plane: OneWayPlane, spots: list[Spot], *, by_cells: bool
+    plane: OneWayPlane, spots: list[Spot], factors: Any = None, *, by_cells: bool
 ) -> Iterator[tuple[Spot, Spot, float]]:
-    """The directed lengths between the centres of cells, in cells."""
+    """The directed lengths between the centres of cells, in cells; with `factors` their costs."""
     if by_cells:
         for one, two in itertools.permutations(spots, 2):
-            yield one, two, plane.cells_length(one[1], two[1])
+            yield one, two, plane.cells_length(one[1], two[1], factors)
         return
     half = Fraction(1, 2)
     placed = [(cell, (cell[0] + half, cell[1] + half)) for _, cell in spots]

@@ -177,7 +177,8 @@ def check(args: CheckOptions) -> None:
 
     That is edges through walls, nodes in walls, parts that are not connected, doors that no edge
     passes, damaged entries. On a building, find that on all floors and links, and compare routes
-    over all floors with the shortest ones. --out writes one page with a picture, .html.
+    over all floors with the shortest ones. --out writes one page with a picture, .html. Without
+    --rooms, rooms are those of rooms.yaml beside the map, if there.
 
     Exits with 0 when no error or warning is found, with 1 otherwise (--fail-on), with 2 when it is
     called wrongly, and with 3 when a file cannot be read.
@@ -197,7 +198,10 @@ def check(args: CheckOptions) -> None:
         graph = hn.ext.fleet.load_graph(args.graph_file, floor=args.floor)
     model = args.load(settings, seconds)
     check_room_to_be(model.grid)
-    topology = grow_topology(model, settings, seconds, rooms_file=args.rooms_file, find_rooms=True)
+    file, map_file = args.rooms_file, args.map_file
+    topology = grow_topology(
+        model, settings, seconds, rooms_file=file, find_rooms=True, map_file=map_file
+    )
     with common.stage("checking", seconds, "check"):
         checked = hn.graphs.check_graph(topology, graph, along_lines=args.along_lines)
     from hybridnav.ext.fleet.findings_report import check_facts, render_check  # noqa: PLC0415 - on demand

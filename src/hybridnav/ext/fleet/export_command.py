@@ -75,7 +75,8 @@ def export(args: ExportOptions) -> None:
     It is a graph of free space, for Nav2's route server, Open-RMF, OpenStreetMap or VDA 5050; or
     MAP's rooms or places, or both as IndoorGML. The file ends in .geojson; for rmf in .yaml, for
     osm in .osm, for lif and indoorgml in .json; that of rooms and places in .geojson or .csv. In
-    rmf, osm and lif the floor is called 0 without --floor.
+    rmf, osm and lif the floor is called 0 without --floor. Without --rooms, rooms are those of
+    rooms.yaml beside the map, if there.
 
     MAP may be a building; it is written for Open-RMF, OpenStreetMap or VDA 5050, or as IndoorGML.
 
@@ -108,8 +109,9 @@ def export(args: ExportOptions) -> None:
     seconds: dict[str, float] = {}
     model = args.load(settings, seconds)
     check_room_to_be(model.grid)
+    file, finds = args.rooms_file, kind != "places"
     topology = grow_topology(
-        model, settings, seconds, rooms_file=args.rooms_file, find_rooms=kind != "places"
+        model, settings, seconds, rooms_file=file, find_rooms=finds, map_file=args.map_file
     )
     if kind in _PARTS:
         with common.stage(f"writing {out}", seconds, "write"):
