@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_683,
-    "lines": 103_315,
+    "code": 65_721,
+    "lines": 103_370,
     "files": 439,
-    "code outside ext": 50_628,
+    "code outside ext": 50_662,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -31,15 +31,15 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 71_835,
+    "lines of tests": 72_198,
 }
 
 BUDGETS = {
     "_base": (2786, 6),
-    "cli": (3817, 6),
+    "cli": (3818, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),
-    "ext/fleet": (10291, 8),
+    "ext/fleet": (10297, 8),
     "ext/live": (7653, 8),
     "ext/page": (3229, 7),
     "graphs": (6570, 6),
@@ -47,7 +47,7 @@ BUDGETS = {
     "harness": (9443, 8),
     "maps": (5304, 6),
     "models": (2113, 6),
-    "planning": (6889, 9),
+    "planning": (6891, 9),
     "pyramid": (4445, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
