@@ -228,6 +228,13 @@ def test_a_door_that_is_lost_by_an_update_is_reported() -> None:
     assert planner.plan(east, west).cost == pytest.approx(2)
     closed = TWO_ROOMS.copy()
     closed[7, 6:8] = 0
-    with pytest.warns(MapWarning, match="one-way line 1 lies nowhere in free space"):
+    with pytest.warns(MapWarning, match="one-way line 1 of the rooms lies nowhere in free space"):
         planner.update(grid=occupancy_grid(closed))
     assert planner.plan((5.5, 7.5), east).cost > 14
+
+
+def test_a_line_of_a_query_that_lies_in_walls_is_reported() -> None:
+    planner = hn.HybridPlanner(map_of(occupancy_grid(TWO_ROOMS), merge_distance_m=3.0))
+    in_the_wall = [(7, 5), (7, 4)]
+    with pytest.warns(MapWarning, match="one-way line 2 lies nowhere in free space"):
+        planner.plan((6.5, 7.5), (8.5, 7.5), one_way={"lines": [[(7, 8), (7, 7)], in_the_wall]})

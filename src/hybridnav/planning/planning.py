@@ -208,15 +208,15 @@ class Planning:
         from hybridnav.closures.one_way import directions_on  # noqa: PLC0415 - loads shapely
 
         found = directions_on(built)
-        self._report_lost(found)
+        self._report_lost(found, " of the rooms")
         return ClosedCells(np.empty(0, np.int64), None, found)
 
-    def _report_lost(self, directed: DirectedSides | None) -> None:
+    def _report_lost(self, directed: DirectedSides | None, of: str = "") -> None:
         """Warn of lines and doors without an effect, as after an update."""
         able = self.grid.enterable(allow_unexplored=self.preset.planner.allow_unexplored)
         for name in () if directed is None else directed.lost(able):
-            text = f"one-way {name} lies nowhere in free space, and has no effect: look at the map"
-            warnings.warn(text, MapWarning, stacklevel=2)
+            text = f"one-way {name}{of} lies nowhere in free space, and has no effect"
+            warnings.warn(f"{text}: look at the map", MapWarning, stacklevel=2)
 
     @cached_property
     def smoothing(self) -> Smooth:

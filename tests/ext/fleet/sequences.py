@@ -142,7 +142,7 @@ class Sequence:
             self.planners[index].plan(*[self.links[0].ends[index].position_m] * 2)
         told = {str(one.message).partition(" lies")[0] for one in caught}
         lost = {
-            f"one-way line {number}"
+            f"one-way line {number} of the rooms"
             for number, line in enumerate(self.lines[index], start=1)
             if is_lost(line, free)
         }
