@@ -1,5 +1,7 @@
 """Colours of rooms: neighbours differ, also through walls; names keep theirs on a later map."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,8 +12,11 @@ import hybridnav as hn
 from hybridnav.maps import RoomLabels
 from hybridnav.viz import plot_rooms, plot_rooms_beside, style
 from hybridnav.viz.room_colours import colour_rooms
+from research._rooms_buildings import SITES, Building
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.strategies import examples, occupancy_grid
+
+MAPS = Path(__file__).parents[2] / "maps"
 
 
 @st.composite
@@ -78,14 +83,24 @@ def test_a_name_has_one_colour_on_both_maps(old, seed):
     assert one.tolist() == other.tolist()
 
 
-@pytest.mark.parametrize("floor", ["2", "3", "3ne"])
-def test_neighbours_differ_on_labelled_maps(data, floor):
-    folder = data / "bwi_gdc" / floor
-    grid = hn.load_map(folder / f"{floor}.yaml", robot_radius_m=0.25)
-    rooms = hn.load_rooms(folder / "locations.yaml", grid)
+@pytest.mark.parametrize("name", SITES)
+def test_neighbours_differ_on_labelled_maps(data, name):
+    building = Building.read(data, name)
+    _, dense = np.unique(np.append(building.true, -1), return_inverse=True)
+    people = named(dense[:-1].reshape(building.true.shape).astype(np.int32) - 1)
+    for rooms in (people, hn.find_rooms(building.grid)):
+        colours = colour_rooms(rooms, building.grid)
+        pairs = facing(rooms.label_of, int(0.9 / building.grid.resolution_m))
+        assert len(pairs) >= len(rooms.names) / 2
+        assert all(colours[one] != colours[other] for one, other in pairs)
+
+
+@pytest.mark.parametrize("name", ["office", "office-explored"])
+def test_neighbours_differ_on_the_maps_of_the_project(name):
+    grid = hn.load_map(MAPS / name / f"{name}.yaml")
+    rooms = hn.find_rooms(grid)
     colours = colour_rooms(rooms, grid)
     pairs = facing(rooms.label_of, int(0.9 / grid.resolution_m))
-    assert len(pairs) > len(rooms.names) / 2
     assert all(colours[one] != colours[other] for one, other in pairs)
 
 

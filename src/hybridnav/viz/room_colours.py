@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import networkx as nx
 import numpy as np
-from scipy import ndimage
 
 from hybridnav._base.typing import IntArray, LongArray
 from hybridnav.maps import NO_ROOM, OccupancyGrid, RoomLabels
@@ -12,8 +11,6 @@ from hybridnav.viz.places import N_COLOURS
 
 _WALL_M = 1.0
 """Width of walls up to which the rooms on both sides are neighbours."""
-_SIDE_M = 0.1
-"""Side of the cells on which walls are measured, of finer maps every second, third, ... one."""
 
 
 def colour_rooms(labels: RoomLabels, grid: OccupancyGrid, *others: RoomLabels) -> LongArray:
@@ -48,18 +45,14 @@ def colour_rooms(labels: RoomLabels, grid: OccupancyGrid, *others: RoomLabels) -
 def neighbours(label_of: IntArray, resolution_m: float) -> LongArray:
     """Return the pairs of rooms that touch or have a wall between them, int64 (n, 2), each once.
 
-    `label_of`: int32 (rows, cols), -1 for no room.
+    `label_of`: int32 (rows, cols), -1 for no room. A wall is crossed along a row or a column.
     """
     n_rooms = int(label_of.max(initial=0)) + 1
-    step = max(1, int(_SIDE_M / resolution_m))
-    coarse = label_of[::step, ::step]
-    away, (row, col) = ndimage.distance_transform_edt(coarse == NO_ROOM, return_indices=True)
-    near = away * (step * resolution_m) <= _WALL_M / 2
-    grown = np.where(near, coarse[row, col], np.int32(NO_ROOM))
-    pairs = [np.empty(0, np.int64)]
-    for of in (label_of, grown):
-        for one, other in ((of[:, :-1], of[:, 1:]), (of[:-1], of[1:])):
-            between = (one != other) & (one != NO_ROOM) & (other != NO_ROOM)
-            low, high = np.sort([one[between], other[between]], axis=0).astype(np.int64)
-            pairs.append(np.unique(low * n_rooms + high))
+    pairs = []
+    for of in (label_of, label_of.T):
+        row, col = np.divmod(np.flatnonzero(of != NO_ROOM), of.shape[1])
+        one, other = of[row[:-1], col[:-1]], of[row[1:], col[1:]]
+        faces = (one != other) & (np.diff(row) == 0) & (np.diff(col) * resolution_m <= _WALL_M)
+        low, high = np.sort([one[faces], other[faces]], axis=0).astype(np.int64)
+        pairs.append(low * n_rooms + high)
     return np.stack(np.divmod(np.unique(np.concatenate(pairs)), n_rooms), axis=1)
