@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_721,
-    "lines": 103_370,
+    "code": 65_723,
+    "lines": 103_373,
     "files": 439,
-    "code outside ext": 50_662,
+    "code outside ext": 50_664,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -31,7 +31,7 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 72_205,
+    "lines of tests": 72_242,
 }
 
 BUDGETS = {
@@ -51,7 +51,7 @@ BUDGETS = {
     "pyramid": (4445, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
-    "rooms": (5526, 8),
+    "rooms": (5536, 8),
     "route": (1031, 6),
     "search": (12925, 9),
     "topology": (699, 6),

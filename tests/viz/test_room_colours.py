@@ -83,25 +83,26 @@ def test_a_name_has_one_colour_on_both_maps(old, seed):
     assert one.tolist() == other.tolist()
 
 
+def assert_neighbours_differ(rooms, grid):
+    colours = colour_rooms(rooms, grid)
+    pairs = facing(rooms.label_of, int(0.9 / grid.resolution_m))
+    assert len(pairs) >= len(rooms.names) / 2
+    assert all(colours[one] != colours[other] for one, other in pairs)
+
+
 @pytest.mark.parametrize("name", SITES)
 def test_neighbours_differ_on_labelled_maps(data, name):
     building = Building.read(data, name)
     _, dense = np.unique(np.append(building.true, -1), return_inverse=True)
     people = named(dense[:-1].reshape(building.true.shape).astype(np.int32) - 1)
     for rooms in (people, hn.find_rooms(building.grid)):
-        colours = colour_rooms(rooms, building.grid)
-        pairs = facing(rooms.label_of, int(0.9 / building.grid.resolution_m))
-        assert len(pairs) >= len(rooms.names) / 2
-        assert all(colours[one] != colours[other] for one, other in pairs)
+        assert_neighbours_differ(rooms, building.grid)
 
 
 @pytest.mark.parametrize("name", ["office", "office-explored"])
 def test_neighbours_differ_on_the_maps_of_the_project(name):
     grid = hn.load_map(MAPS / name / f"{name}.yaml")
-    rooms = hn.find_rooms(grid)
-    colours = colour_rooms(rooms, grid)
-    pairs = facing(rooms.label_of, int(0.9 / grid.resolution_m))
-    assert all(colours[one] != colours[other] for one, other in pairs)
+    assert_neighbours_differ(hn.find_rooms(grid), grid)
 
 
 def pixel(ax, point):

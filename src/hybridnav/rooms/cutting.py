@@ -14,6 +14,9 @@ from hybridnav.maps.clearance import clearance_cells, closing, within_radius
 from hybridnav.rooms.kernels import cutting as _cell_kernels
 
 _ROUNDING = 1e-9
+_ALONE, _NOISE = 7, 0.003
+"""Free cells of the eight round an occupied one from which on it is alone; how many such there are
+for each free cell in a map of noise. Of 43 real maps none has more than 0.0026: legs of chairs."""
 _CLOSE_M = 0.15
 _CLOSE_RAYS_M = 0.25
 _HOLE_M2 = 0.5
@@ -81,12 +84,19 @@ class Ground:
     def of(cls, kinds: ByteArray, resolution_m: float) -> Ground:
         """Return the ground of some cells.
 
-        On a scan of single rays, the unexplored cells between them count as free, and what is
-        unexplored beyond as wall.
+        Where many occupied cells stand alone, they are noise and count as free. On a scan of single
+        rays, so do the unexplored cells between them, and what is unexplored beyond is wall.
 
         `kinds`: uint8 (rows, cols), see `Kind`; `resolution_m`: side of a cell in metres.
         """
         occupied, free = kinds == Kind.WALL, kinds == Kind.INSIDE
+        beside = np.pad(free, 1).view(np.uint8)
+        beside = beside[:-2] + beside[1:-1] + beside[2:]
+        alone = occupied & (beside[:, :-2] + beside[:, 1:-1] + beside[:, 2:] >= _ALONE)
+        if np.count_nonzero(alone) > _NOISE * np.count_nonzero(free):
+            free |= alone
+            occupied &= ~alone
+        del beside, alone
         closed = closed_by_disc(free, occupied, _CLOSE_M / resolution_m)
         rim = _rim(closed)
         n_unexplored = np.count_nonzero(rim & (kinds == Kind.UNKNOWN))
