@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_723,
-    "lines": 103_373,
+    "code": 65_730,
+    "lines": 103_382,
     "files": 439,
-    "code outside ext": 50_664,
+    "code outside ext": 50_671,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -31,7 +31,7 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 72_242,
+    "lines of tests": 72_245,
 }
 
 BUDGETS = {
@@ -47,7 +47,7 @@ BUDGETS = {
     "harness": (9443, 8),
     "maps": (5304, 6),
     "models": (2113, 6),
-    "planning": (6891, 9),
+    "planning": (6896, 9),
     "pyramid": (4445, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),

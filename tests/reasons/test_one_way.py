@@ -54,6 +54,8 @@ def test_proofs_of_directed_plans_are_accepted_and_bound_the_optimum(preset):
             if has_path:
                 # The costs of `robot` are at least the lengths that the oracle knows.
                 assert proof["bound"] <= (result.cost if preset == "robot" else best) + 1e-9
+                least = best if proof["one_way"] else 0.0  # lines between walls count for nothing
+                assert min(proof["bound"], result.lower_bound) >= least * (1 - 1e-8)
                 if preset != "robot":
                     assert proof["bound"] == pytest.approx(best, abs=1e-9)
             # Without directions another path, or a path at all, may be there.
@@ -88,7 +90,8 @@ def test_no_heights_prove_a_length_that_is_too_high_past_lines():
         for planner, result, best in plans(scene, "shortest"):
             if not 0 < best < math.inf:
                 continue
-            proof = forged(hn.prove(result), planner.grid, rng)
+            one_way = hn.OneWay(sides=scene.sides).on(planner.grid)
+            proof = forged(hn.prove(result), planner.grid, rng, one_way)
             walls = np.pad(~scene.free, 1, constant_values=True)
             bars = check_proof.bars_of(walls.shape, proof)
             ends = np.array(proof["line"])[[0, -1]]

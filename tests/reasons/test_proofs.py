@@ -133,7 +133,7 @@ def test_an_end_between_two_walls_that_meet_lies_in_the_cell_beyond(preset):
             assert proof.get("bound", math.inf) == pytest.approx(result.cost, abs=1e-12)
 
 
-def forged(proof, grid, rng):
+def forged(proof, grid, rng, one_way=None):
     """Return a proof of a bound that is too high, with a longer path and other heights."""
     more = float(rng.choice([1e-6, 1e-3, 0.1, 1.0]))
     line = np.array(proof["line"])
@@ -145,7 +145,7 @@ def forged(proof, grid, rng):
     bound = proof["bound"] / grid.resolution_m + more
     reach = bound * float(rng.choice([1, 1, 1.2]))
     ends = np.array([start, goal])
-    heights, _ = strings_near(grid.enterable(), ends, reach, proof["one_way"])
+    heights, _ = strings_near(grid.enterable(), ends, reach, one_way)
     for _ in range(int(rng.integers(4))):
         if heights:
             n = int(rng.integers(len(heights)))

@@ -262,8 +262,13 @@ class CostFinish:
         first, last = (frame.position_of(*point.tolist()) for point in query.points)
         per_cell = frame.resolution_m
         known = cost_m / per_cell
-        found = cost_bound(line.free, line.factors, (first, last), query.cells, known) * per_cell
-        return min(max(found, query.straight_m), cost_m)
+        found = cost_bound(line.free, line.factors, (first, last), query.cells, known)
+        if query.one_way is not None:  # no cost is below a length
+            from hybridnav.search.proofs import strings_near  # noqa: PLC0415 - as above
+
+            given = line.free, (first, last), known, query.one_way
+            found = max(found, strings_near(*given)[1] * (1 - 2e-9))
+        return min(max(found * per_cell, query.straight_m), cost_m)
 
     def _line_for(self, closed: ClosedCells | None) -> CostLine:
         """Return the shortener of paths; with closed cells, one for this query."""

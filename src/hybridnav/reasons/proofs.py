@@ -209,15 +209,15 @@ def _line_by_costs(problem: _Problem) -> dict[str, Any]:
     ends = line[[0, -1]].tolist()
     given = problem.free, layer.factors, ends, cells.tolist(), cost / per_cell
     proof, least = moves_of_king(grid, math.floor(known * UNIT), given)
-    bound = max(least / UNIT - joins, dist(*line[[0, -1]])) * (1 - 2e-9)
-    return {
-        "kind": "line",
-        "cost": cost,
-        "bound": bound * per_cell,
-        "line": line.tolist(),
-        "corners": corners.tolist(),
-        **proof,
-    }
+    bound, proof = max(least / UNIT - joins, dist(*ends)), proof | {"corners": corners.tolist()}
+    if problem.one_way is not None:  # the king knows no directions, lengths do
+        known = cost / per_cell
+        heights, length = strings_near(problem.free, line[[0, -1]], known, problem.one_way)
+        if length > bound:
+            near = [row for row in heights if min(row[2:]) + dist(row[:2], ends[1]) < length]
+            bound, proof = length, {"heights": near}
+    bound *= per_cell * (1 - 2e-9)
+    return {"kind": "line", "cost": cost, "bound": bound, "line": line.tolist(), **proof}
 
 
 def _line(problem: _Problem) -> dict[str, Any]:
@@ -225,8 +225,8 @@ def _line(problem: _Problem) -> dict[str, Any]:
     assert result.path is not None  # noqa: S101 - it is solved
     line = _distinct(problem.grid.frame.positions_of(result.path.points))
     per_cell = problem.grid.resolution_m
-    near, lines = result.lower_bound / per_cell * (1 - 1e-9), problem.stated["one_way"]
-    heights, _ = strings_near(problem.free, line[[0, -1]], near, lines)
+    near = result.lower_bound / per_cell * (1 - 1e-9)
+    heights, _ = strings_near(problem.free, line[[0, -1]], near, problem.one_way)
     return {
         "kind": "line",
         "cost": result.cost,

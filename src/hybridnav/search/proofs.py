@@ -26,6 +26,7 @@ from hybridnav.check_proof import (
 from hybridnav.search.directed import DirectedSides
 from hybridnav.search.kernels.proofs import OUTSIDE, strings_of, tree_of, walls_round
 from hybridnav.search.lattice import slopes_of
+from hybridnav.search.mesh.slits import lines_of
 
 _LESS = 1e-11
 """Cells by which a distance that is stated is below the one that holds without."""
@@ -221,16 +222,19 @@ def _chain_round(area: BoolArray, goal: tuple[int, int]) -> LongArray:
 
 
 def strings_near(
-    free: BoolArray, ends: FloatArray, bound_cells: float, one_way: list[Any]
+    free: AnyArray, ends: Any, bound_cells: float, one_way: DirectedSides | None
 ) -> tuple[list[Any], float]:
     """Return the corners over which a path may be shorter than a bound, as far as the straight way
     to the goal tells.
 
-    `free`: bool (rows, cols), cells that may be entered; `ends`: float64 (2, 2), positions (row,
-    col) of start and goal in grid units; `bound_cells`: length in cells; `one_way`: lines as a
-    proof states them. Returns rows of (row, col, distance from the start in cells), of four where
-    the cells at a corner differ; and the bound for paths from and to any cell at an end on a line.
+    `free`: bool or uint8 (rows, cols), cells that may be entered; `ends`: float64 (2, 2), positions
+    (row, col) of start and goal in grid units; `bound_cells`: length in cells; `one_way`: directed
+    sides, None for none. Returns rows of (row, col, distance from the start in cells), of four
+    where the cells at a corner differ; and the least length of all paths, at most the bound, or 0
+    where no sides had to be looked at.
     """
+    free, ends, length = free.view(np.bool_), np.array(ends), 0.0
+    lines = [] if one_way is None else lines_of(free, one_way.sides)
     cells = np.floor(ends).astype(np.int64)
     low, high = _box_of(free, (cells[0], cells[1]), bound_cells)
     walls = np.pad(~free[low[0] : high[0], low[1] : high[1]], 1, constant_values=True)
@@ -238,10 +242,10 @@ def strings_near(
     corners = np.rint(inside).astype(np.int64)
     is_corner = (abs(inside - corners) < 1e-6).all(axis=1)  # noqa: PLR2004
     # There an end is in one of several cells.
-    if one_way or any(walls[r - 1 : r + 1, c - 1 : c + 1].any() for r, c in corners[is_corner]):
-        bars = bars_of(np.add(free.shape, 2), {"one_way": one_way})[::2]
+    if lines or any(walls[r - 1 : r + 1, c - 1 : c + 1].any() for r, c in corners[is_corner]):
+        bars = bars_of(np.add(free.shape, 2), {"one_way": lines})[::2]
         part = np.s_[:, low[0] : high[0] + 2, low[1] : high[1] + 2]
-        found, bound_cells = _directed_strings(walls, bars[part], inside, bound_cells)
+        found, length = _directed_strings(walls, bars[part], inside, bound_cells)
     else:
         grain = 2 ** (30 - max(walls.shape).bit_length())
         points = np.rint(inside * grain).astype(np.int64)
@@ -250,7 +254,7 @@ def strings_near(
         [int(row) + int(low[0]), int(col) + int(low[1]), *(round(far, 10) for far in lengths)]
         for row, col, *lengths in found
     ]
-    return heights, bound_cells
+    return heights, length
 
 
 def _directed_strings(
