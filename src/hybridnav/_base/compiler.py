@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 import llvmlite.binding as llvm
 import numba
-from numba.core import types
+from numba.core import cgutils, types
 from numba.core.caching import (
     CompileResultCacheImpl,
     FunctionCache,
@@ -26,7 +26,7 @@ from numba.core.caching import (
 )
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime.nrt import rtsys
-from numba.extending import overload, register_jitable
+from numba.extending import intrinsic, overload, register_jitable
 
 from hybridnav._base import shipped
 from hybridnav._base.clock import listen
@@ -194,6 +194,40 @@ def _load_arrays() -> None:
         vars(import_module("numba.np.arraymath"))["_HAVE_BLAS"] = True  # scipy has it
     finally:
         del sys.modules[blas]
+
+
+@cache
+def array_at(n_axes: int, is_fixed: bool) -> Any:  # noqa: FBT001 - keys of a cache
+    """Return what kernels call for an array of `kernels.places`; numba's `carray` makes an array of
+    a pointer in the same way, but none that is read only."""
+    arrays: Any = import_module("numba.np.arrayobj")  # without types
+
+    def made(_typing: Any, places: Any, k: Any, dtype: Any) -> Any:
+        made_of = types.Array(dtype.dtype, n_axes, "C", readonly=is_fixed)
+
+        def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            table = arrays.make_array(signature.args[0])(context, builder, given[0])
+            at = builder.mul(context.cast(builder, given[1], k, types.intp), cgutils.intp_t(3))
+            place, *shape = (
+                builder.load(builder.gep(table.data, [builder.add(at, cgutils.intp_t(i))]))
+                for i in range(1 + n_axes)
+            )
+            element = context.get_data_type(made_of.dtype)
+            size = cgutils.intp_t(context.get_abi_sizeof(element))
+            array = arrays.make_array(made_of)(context, builder)
+            arrays.populate_array(
+                array,
+                data=builder.inttoptr(place, element.as_pointer()),
+                shape=shape,
+                strides=[builder.mul(size, each) for each in shape[1:]] + [size],
+                itemsize=size,
+                meminfo=None,  # nobody counts who uses it
+            )
+            return array._getvalue()  # noqa: SLF001 - numba's way
+
+        return made_of(places, k, dtype), build
+
+    return intrinsic(made)
 
 
 class _Renewed(CPUDispatcher):

@@ -228,10 +228,6 @@ def compile_plan(preset: str) -> None:
             # Fields below the places, which this map has none of by default.
             fine = hn.load_preset("paper", overrides=["planner.field_cells=4"])
             hn.HybridPlanner(topology, preset=fine).plan(*endpoints)
-        if preset == "octile":
-            probability = grid.probability.copy()
-            probability[4:6, 4:6] = 1.0
-            planner.update(grid=replace(grid, probability=probability))
         if preset == "robot":
             path = planner.plan(*endpoints, smooth="line-of-sight").path
             assert path is not None  # noqa: S101 - the rooms have doors

@@ -76,14 +76,10 @@ def begun(now: Planning, update: PlannerUpdate) -> Callable[[], Planning]:
             "make a new planner of the map now"
         )
     if update.grid is not None or update.topology is not None:
-        return partial(_caught_up, _followed(now, update))
+        followed = _followed(now, update)
+        return lambda: followed
     assert update.costs is not None  # noqa: S101 - one of the three is given
     return partial(_recosted, now, *now.costs.changed(update.costs, update.box))
-
-
-def _caught_up(planning: Planning) -> Planning:
-    planning.method.catch_up()
-    return planning
 
 
 def _recosted(now: Planning, costs: PlannerCosts, box: Box) -> Planning:

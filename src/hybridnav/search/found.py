@@ -297,10 +297,6 @@ class Method(Protocol):
         """Return the method of a changed map, this one stays as it is; None to make it anew."""
         return None
 
-    def catch_up(self) -> None:
-        """Bring structures that `changed` took over up to date; no query runs meanwhile."""
-        return
-
     def take_costs(self, costs: CostLayer, box: Box) -> bool:  # noqa: ARG002 - a default
         """Plan by other costs from now on; no query runs meanwhile. False to be made anew.
 

@@ -11,7 +11,7 @@ from hybridnav._base.clock import clock
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import behind, keep_last
-from hybridnav._base.typing import BoolArray, LongArray
+from hybridnav._base.typing import BoolArray
 from hybridnav.planning import PlannerSettings
 from hybridnav.planning.methods.grid import KnownMap, WholeMap, enterable_of, round_closed
 from hybridnav.search.found import (
@@ -26,11 +26,8 @@ from hybridnav.search.found import (
     QueryMany,
 )
 from hybridnav.search.octile import JumpGraph, JumpSearch, build_jump_graph, contract_graph
-from hybridnav.search.octile.repair import FollowingGraph
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from hybridnav.search.distance_table import LabelSource
 
 
@@ -43,9 +40,6 @@ _KEPT = 4
 """Number of graphs with directions that are kept for queries with equal closures."""
 
 
-_Held = tuple[JumpSearch | None, FollowingGraph | None]
-
-
 def _search_of(graph: JumpGraph) -> JumpSearch:
     return JumpSearch(contract_graph(graph) if graph.n_corners >= CONTRACTED_FROM else graph)
 
@@ -55,8 +49,7 @@ class OverJumps(Method):
     """Shortest paths of cells; the graph is built when the first query needs it.
 
     It is contracted at once, so that a query gets the same one of several shortest paths: always on
-    a map of fewer than `MANY_CELLS`, on a larger one as soon as the graph is there. After a change
-    of the map, a graph that is too small for that is repaired in place.
+    a map of fewer than `MANY_CELLS`, on a larger one as soon as the graph is there.
 
     If corners may be cut, the graph lacks some moves: then A* searches the whole map.
 
@@ -72,8 +65,6 @@ class OverJumps(Method):
         self._known = known._replace(prepared=None)
         self._whole_map = WholeMap(known, settings)
         self._search = known.prepared if isinstance(known.prepared, JumpSearch) else None
-        self._following: FollowingGraph | None = None
-        self._waiting: tuple[Callable[[], _Held], LongArray, BoolArray] | None = None
         self._directed: dict[ClosedCells, JumpSearch] = {}
         self._building = threading.RLock()  # a progress callback may plan
         self._begun = threading.Lock()
@@ -81,17 +72,17 @@ class OverJumps(Method):
 
     @property
     def prepared(self) -> JumpSearch | None:
-        """The search of the graph, None until it is built, and while it follows the map."""
-        return None if self._following else self._search
+        """The search of the graph, None until it is built."""
+        return self._search
 
     def prepare(self, progress: Progress = no_progress) -> JumpSearch:
-        """Build the graph, once, and anew after changes; see `Method`."""
-        if self._search is None or self._following:
+        """Build the graph, once; see `Method`."""
+        if self._search is None:
             with self._building:
-                if self._search is None or self._following:
+                if self._search is None:
                     graph = build_jump_graph(self._free())
                     progress(1, 2)
-                    self._search, self._following = _search_of(graph), None
+                    self._search = _search_of(graph)
                     # Without the search of the first answers, 5 bytes a cell.
                     self._whole_map = WholeMap(self._known, self._settings)
                     progress(2, 2)
@@ -101,43 +92,13 @@ class OverJumps(Method):
         return self._grid.enterable(allow_unexplored=self._allow_unexplored)
 
     def changed(self, change: MapChange) -> OverJumps:
-        """Return the method of the changed map, whose graph is repaired by `catch_up`, or built by
-        the next query; see `Method`."""
-        allowed, (grid, *_, cells) = self._allow_unexplored, change
+        """Return the method of the changed map, whose graph the next query builds; see `Method`."""
+        allowed, search, (grid, *_, cells) = self._allow_unexplored, self._search, change
         was, now = (
             enterable_of(each, cells, allow_unexplored=allowed) for each in (self._grid, grid)
         )
-        differs = was != now
-        made = OverJumps(KnownMap(grid, change.topology), self._settings)
-        made._waiting = self._hand_over, cells[differs], now[differs]
-        if not differs.any():
-            made._search = self._search
-        return made
-
-    def catch_up(self) -> None:
-        """Take the graph of the map before, and repair it where cells changed; see `Method`.
-
-        The method of that map builds another one if it is asked again.
-        """
-        if self._waiting is None:
-            return
-        take, cells, is_free = self._waiting
-        search, following = take()
-        if search is not None and len(cells):
-            is_small = search.graph.n_corners < CONTRACTED_FROM
-            following = (following or FollowingGraph(search.graph)) if is_small else None
-            is_followed = following is not None and following.follow(cells, is_free)
-            search = JumpSearch(following.graph) if following and is_followed else None
-            # A larger graph is contracted, which finds another one of several shortest paths.
-            if search is not None and search.graph.n_corners >= CONTRACTED_FROM:
-                search = None
-        self._waiting, self._following, self._search = None, following if search else None, search
-
-    def _hand_over(self) -> _Held:
-        """Return the search and its graph that follows, which this method has no more."""
-        found = self._search, self._following
-        self._search = self._following = None
-        return found
+        search = search if (was == now).all() else None
+        return OverJumps(KnownMap(grid, change.topology, prepared=search), self._settings)
 
     def find(self, query: Query) -> Found:
         """Find a shortest path between two cells; see `Method`."""

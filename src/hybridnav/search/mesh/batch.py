@@ -111,16 +111,16 @@ def _one_by_one(
     effort, asked = (1.0 + epsilon, NO_LIMIT), (where, endpoints)
     graph, works = search.engine
     at = n = 0
-    work = works.take()
+    work, places = works.take()
     while at < count:
         found = (length, bound, starts, positions), at, n
         at, n, short = many(
             search.arrays, search.mesh.polygon_at, graph, asked, work, effort, *found
         )
         if short == WORK_FULL:
-            work = doubled(work)
+            work, places = doubled(work), None
         elif short == ANSWERS_FULL:
             positions = np.concatenate([positions, np.empty_like(positions)])
-    works.give(work)
+    works.give((work, places))
     bound = np.where(bound >= length, length, bound * SURE)
     return MeshPaths(length, bound, starts, positions[:n])

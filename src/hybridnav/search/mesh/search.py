@@ -12,13 +12,14 @@ import numpy as np
 
 from hybridnav._base.copies import copies_alike
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.kernels.places import places_of
 from hybridnav._base.moves import FAR
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool, behind
 from hybridnav.search.mesh.build import MANY_CORNERS, add_landmarks, contract_corners, find_edges
 from hybridnav.search.mesh.kernels.intervals import DIRECTED
 from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, N_COUNTS, WORK_FULL
-from hybridnav.search.mesh.kernels.queries import answer
+from hybridnav.search.mesh.kernels.queries import answer, answer_climbing
 from hybridnav.search.mesh.kernels.state import (
     GROWING,
     CornerWork,
@@ -71,8 +72,12 @@ class MeshPath(NamedTuple):
     """Intervals, or corners, that the search expanded."""
 
 
+def _works_for(mesh: ConvexMesh, graph: Graph) -> tuple[Work, LongArray | None]:
+    """Return the work arrays of one query, whose places nobody has asked for."""
+    return _work_for(mesh, graph), None
+
+
 def _work_for(mesh: ConvexMesh, graph: Graph) -> Work:
-    """Return the work arrays of one query."""
     n, n_polygons = len(mesh.corners), mesh.n_polygons
     heap = Heap(np.empty(_ROOM), np.empty(_ROOM, np.int32))
     counts, bounds = np.zeros(N_COUNTS, np.int64), np.zeros(2)
@@ -190,7 +195,7 @@ class MeshSearch:
 
     def _use(self, graph: Graph) -> None:
         # In one step, for the queries of other threads.
-        self.engine = graph, Pool(partial(_work_for, self.mesh, graph))
+        self.engine = graph, Pool(partial(_works_for, self.mesh, graph))
 
     def path(
         self,
@@ -226,21 +231,26 @@ class MeshSearch:
             else:
                 behind(self._begun, self.prepare)
         graph, works = self.engine
-        work = works.take()
+        work, places = works.take()
         limit = step = NO_LIMIT if until == math.inf else SLICE
         while True:
             effort = 1.0 + epsilon, limit
-            status, path, length, bound = answer(
-                self.arrays, self._polygon_at, graph, cells, positions, work, effort
-            )
+            if isinstance(graph, Hierarchy):
+                if places is None:
+                    places = places_of(self.arrays, self._polygon_at, graph, work)
+                found = answer_climbing(places, cells, positions, effort)
+            else:
+                given = self.arrays, self._polygon_at, graph, cells, positions, work
+                found = answer(*given, effort)
+            status, path, length, bound = found
             if status == DONE:
                 break
             if status == WORK_FULL:
-                work = doubled(work)
+                work, places = doubled(work), None
             else:
                 limit = -1 if perf_counter() >= until else limit + step
         expanded = int(work.counts[EXPANDED])
-        works.give(work)
+        works.give((work, places))
         if not self.is_prepared:
             self.expanded += expanded
         bound = length if bound >= length else bound * SURE

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
+from hybridnav._base.kernels.places import places_of
 from hybridnav._base.moves import DIAGONAL, FAR, STRAIGHT
 from hybridnav._base.threads import SHARES, Pool, cores
 from hybridnav.maps.geometry import centres
@@ -255,7 +256,7 @@ def contract_graph(graph: JumpGraph) -> JumpGraph:
 # Shortest octile paths on a jump-point graph, exact.
 
 
-KERNEL = kernels.paths
+KERNEL = kernels.path_between
 """The kernel whose compiled form shows that a search was run before."""
 
 Cell = tuple[int, int]
@@ -298,6 +299,8 @@ class _Work:
         heaps = tuple(np.empty((n_corners + n_arcs + 1, 2), dtype=np.int64) for _ in range(2))
         touched, found = np.empty(n_corners, np.int64), np.empty(n_corners, np.int32)
         self.arrays = records, heaps, touched, found
+        self.places: LongArray | None = None
+        """The places of the graph's arrays and of these, once somebody has asked for them."""
 
 
 @copies_alike
@@ -336,11 +339,23 @@ class JumpSearch:
 
     def path(self, start: Cell, goal: Cell) -> JumpPath:
         """Find a shortest path between two free cells."""
-        _, cells, counts = self._paths(np.array([[*start, *goal]], dtype=np.int64))
-        straight, diagonal, expanded = counts[0].tolist()
+        work = self._works.take()
+        given = self._given(work)
+        cells, straight, diagonal, expanded = kernels.path_between(*given, (start, goal))
+        self._works.give(work)
         if straight < 0:
             return JumpPath(None, math.inf, expanded)
         return JumpPath(cells, straight + diagonal * math.sqrt(2.0), expanded)
+
+    def _given(self, work: _Work) -> tuple[LongArray, AnyArray, AnyArray]:
+        """Return what kernels take of the graph and of work arrays."""
+        arrays, graph = self.arrays, self.graph
+        places = work.places
+        if places is None:
+            (index, _, order, width), *corners = arrays[:6]
+            rest = graph.middles, arrays.reach, width, *graph.origin, work.arrays
+            places = work.places = places_of(index, order, *corners, *rest)
+        return places, arrays.tables[1], arrays.back[1]
 
     def watch(self, start: Cell, goal: Cell) -> SearchRecord:
         """Search between two free cells, and return the corner cells that were reached.
@@ -350,8 +365,8 @@ class JumpSearch:
         graph, work = self.graph, _Work(self.graph.n_corners, len(self.graph.arcs))
         records, _, touched, _ = work.arrays
         touched[:] = -1
-        _, path, counts = self._paths(np.array([[*start, *goal]], dtype=np.int64), work)
-        straight, diagonal, _ = counts[0].tolist()
+        given = self._given(work)
+        path, straight, diagonal, _ = kernels.path_between(*given, (start, goal))
         nodes = touched[: np.argmax(np.append(touched, -1) < 0)]
         side, which = np.nonzero(records[nodes, 2:].T != FAR)  # the kernel clears costs alone
         nodes = nodes[which]
@@ -395,12 +410,9 @@ class JumpSearch:
         path_start = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
         return JumpPaths(length, path_start, cells, counts[:, 2])
 
-    def _paths(self, endpoints: LongArray, own: _Work | None = None) -> tuple[Any, Any, Any]:
+    def _paths(self, endpoints: LongArray) -> tuple[Any, Any, Any]:
         """Return the offsets of the paths, their cells, and the moves and expansions of each."""
-        work = self._works.take() if own is None else own
-        found: tuple[Any, Any, Any] = kernels.paths(
-            self.arrays, self.graph.middles, self.graph.origin, endpoints, work.arrays
-        )
-        if own is None:
-            self._works.give(work)
+        work = self._works.take()
+        found: tuple[Any, Any, Any] = kernels.paths(*self._given(work), endpoints)
+        self._works.give(work)
         return found

@@ -4,6 +4,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit, overload
 from hybridnav._base.kernels.exact import GRAIN
+from hybridnav._base.kernels.places import fixed, fixed_rows, room, room_rows
 from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.hierarchy_search import query_hierarchy
 from hybridnav.search.mesh.kernels.polyanya import (
@@ -13,7 +14,15 @@ from hybridnav.search.mesh.kernels.polyanya import (
     WORK_FULL,
     query_intervals,
 )
-from hybridnav.search.mesh.kernels.state import Corners, Ends, Hierarchy, MeshBlocks
+from hybridnav.search.mesh.kernels.state import (
+    Corners,
+    Ends,
+    Hierarchy,
+    HierarchyWork,
+    Mesh,
+    MeshBlocks,
+    ViewRoom,
+)
 
 _QUERIES = {MeshBlocks: query_intervals, Corners: query_corners, Hierarchy: query_hierarchy}
 """The kernel of one query on each kind of graph."""
@@ -71,6 +80,51 @@ def answer(mesh, polygon_at, graph, cells, positions, work, effort):
     points = into_cell(col, x), into_cell(row, y), into_cell(to_col, to_x), into_cell(to_row, to_y)
     status, path = query(mesh, graph, where, points, work, effort)
     return status, path, work.bounds[UPPER], work.bounds[LOWER]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def answer_climbing(places, cells, positions, effort):
+    """Answer one query on a hierarchy, or resume the search; see `answer`.
+
+    `places`: `places_of` of a `Mesh`, `polygon_at`, a `Hierarchy` and its work.
+    """
+    mesh = Mesh(
+        room(places, 0, np.float64),
+        room(places, 1, np.float64),
+        fixed(places, 2, np.uint8),
+        fixed(places, 3, np.int32),
+        fixed(places, 4, np.int32),
+        room(places, 5, np.int32),
+        fixed(places, 6, np.int32),
+        fixed(places, 7, np.int32),
+        fixed(places, 8, np.int32),
+        fixed(places, 9, np.int32),
+    )
+    graph = Hierarchy(
+        fixed(places, 11, np.int32),
+        fixed_rows(places, 12, np.int64),
+        fixed(places, 13, np.int64),
+        fixed_rows(places, 14, np.int64),
+    )
+    views = ViewRoom(
+        room_rows(places, 19, np.int32),
+        room_rows(places, 20, np.float64),
+        room(places, 21, np.int32),
+    )
+    work = HierarchyWork(
+        room(places, 15, np.int32),
+        room(places, 16, np.int32),
+        room(places, 17, np.int64),
+        room(places, 18, np.float64),
+        views,
+        room_rows(places, 22, np.int64),
+        room(places, 23, np.int32),
+        room_rows(places, 24, np.int64),
+        room_rows(places, 25, np.int64),
+    )
+    polygon_at = fixed_rows(places, 10, np.int32)
+    return answer(mesh, polygon_at, graph, cells, positions, work, effort)
 
 
 ANSWERS_FULL = 3

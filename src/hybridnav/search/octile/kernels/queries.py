@@ -3,9 +3,15 @@
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.places import fixed, fixed_rows, room, room_rows
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import corners_between
-from hybridnav.search.octile.kernels.legs import FROM_START, row_col_kind, shortest
+from hybridnav.search.octile.kernels.legs import (
+    FROM_START,
+    CornerCells,
+    row_col_kind,
+    shortest,
+)
 
 
 @njit(cache=True, nogil=True)
@@ -105,39 +111,85 @@ def _with_room(cells, n_cells, more):
     return larger
 
 
-@guarded
 @njit(cache=True, nogil=True)
-def paths(graph, middles, origin, endpoints, work):
-    """Find shortest paths between pairs of cells.
+def _parts(places, ahead, behind):
+    """Return a graph, the corner cells that its arcs lead past, and work; see `path_between`."""
+    index, order = fixed_rows(places, 0, np.int64), fixed(places, 1, np.int32)
+    width = places[9, 0]
+    graph = CornerCells(
+        (index, ahead, order, width),
+        fixed(places, 2, np.int64),
+        fixed(places, 3, np.int32),
+        room_rows(places, 4, np.int64),
+        fixed(places, 5, np.int32),
+        fixed_rows(places, 6, np.int64),
+        (index, behind, order, width),
+        fixed_rows(places, 8, np.bool_),
+    )
+    heaps = room_rows(places, 13, np.int64), room_rows(places, 14, np.int64)
+    touched, found = room(places, 15, np.int64), room(places, 16, np.int32)
+    work = room_rows(places, 12, np.int64), heaps, touched, found
+    return graph, fixed(places, 7, np.int64), work
 
-    `graph`, `work`: see `shortest`; `middles`: int64 (m,), the corner cells that the arcs of a
-    contracted graph lead past; empty for a graph that is not contracted; `origin`: row and column
-    of the framed grid's first cell; `endpoints`: int64 (k, 4), row and column of the start, then of
-    the goal; free cells. Returns int64 (k + 1,), where the cells of each path begin; int64 (c, 2),
-    the cells (row, col); int64 (k, 3), moves along sides, moves along diagonals, -1 for both where
-    there is no path, and corner cells expanded.
-    """
+
+@njit(cache=True, nogil=True)
+def _append(parts, origin, ends, cells, n_cells, counts):
+    """Append the cells of a shortest path to others, and set its counts; return the cells, in a new
+    array if there was no room, and their number."""
+    graph, middles, work = parts
     width, first = graph.tables[3], graph.first
     records, _, touched, _ = work
-    n = endpoints.shape[0]
-    begin = np.zeros(n + 1, np.int64)
-    counts = np.full((n, 3), np.int64(-1))
-    cells = np.empty((0, 2), np.int64)
-    n_cells = np.int64(0)
-    for i in range(n):
-        pair = (
-            (endpoints[i, 0] - origin[0]) * width + endpoints[i, 1] - origin[1],
-            (endpoints[i, 2] - origin[0]) * width + endpoints[i, 3] - origin[1],
+    (row, col), (to_row, to_col) = ends
+    pair = (
+        (row - origin[0]) * width + col - origin[1],
+        (to_row - origin[0]) * width + to_col - origin[1],
+    )
+    cost, meeting, counts[2], n_touched = shortest(graph, pair, middles.size > 0, work)
+    counts[0] = counts[1] = -1
+    if cost < FAR:
+        nodes = touched[:0]
+        if meeting >= 0:
+            nodes = corners_between((first, middles), meeting, records)
+        cells, n_cells, counts[0], counts[1] = cells_of(
+            graph, pair, meeting, nodes, origin, cells, n_cells
         )
-        cost, meeting, counts[i, 2], n_touched = shortest(graph, pair, middles.size > 0, work)
-        if cost < FAR:
-            nodes = touched[:0]
-            if meeting >= 0:
-                nodes = corners_between((first, middles), meeting, records)
-            cells, n_cells, counts[i, 0], counts[i, 1] = cells_of(
-                graph, pair, meeting, nodes, origin, cells, n_cells
-            )
-        for k in range(n_touched):
-            records[touched[k], 0] = records[touched[k], 1] = FAR
+    for k in range(n_touched):
+        records[touched[k], 0] = records[touched[k], 1] = FAR
+    return cells, n_cells
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def path_between(places, ahead, behind, ends):
+    """Find a shortest path between two free cells.
+
+    `places`: `places_of` of the index, order, places, component, follow, first, arcs, middles and
+    reach of a graph, its width, its origin, and work, see `shortest`; `ahead`, `behind`: see
+    `JumpGraph`; `ends`: (row, col) of start and goal. Returns int64 (n, 2), the cells (row, col);
+    moves along sides, moves along diagonals, -1 for both where there is no path, and corner cells
+    expanded.
+    """
+    counts, origin = np.empty(3, np.int64), (places[10, 0], places[11, 0])
+    parts, cells = _parts(places, ahead, behind), np.empty((0, 2), np.int64)
+    cells, n_cells = _append(parts, origin, ends, cells, 0, counts)
+    return cells[:n_cells], counts[0], counts[1], counts[2]
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def paths(places, ahead, behind, endpoints):
+    """Find shortest paths between pairs of cells.
+
+    `places`, `ahead`, `behind`: see `path_between`; `endpoints`: int64 (k, 4), row and column of
+    the start, then of the goal; free cells. Returns int64 (k + 1,), where the cells of each path
+    begin; int64 (c, 2), the cells (row, col); int64 (k, 3), as the numbers of `path_between`.
+    """
+    origin = places[10, 0], places[11, 0]
+    parts, cells = _parts(places, ahead, behind), np.empty((0, 2), np.int64)
+    n = endpoints.shape[0]
+    begin, counts, n_cells = np.zeros(n + 1, np.int64), np.empty((n, 3), np.int64), 0
+    for i in range(n):
+        ends = (endpoints[i, 0], endpoints[i, 1]), (endpoints[i, 2], endpoints[i, 3])
+        cells, n_cells = _append(parts, origin, ends, cells, n_cells, counts[i])
         begin[i + 1] = n_cells
     return begin, cells[:n_cells], counts

@@ -14,7 +14,7 @@ BLOCKED = -1
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def n_bits(word):
+def _n_bits(word):
     """Count the bits that are set in an int64."""
     pairs = word - (word >> 1 & 0x5555555555555555)
     fours = (pairs & 0x3333333333333333) + (pairs >> 2 & 0x3333333333333333)
@@ -25,7 +25,7 @@ def n_bits(word):
 def number_of(index, cell):
     """Return the number of a free cell; see `number_cells` for the index."""
     word, before = cell >> 6, (np.int64(1) << (cell & 63)) - 1
-    return (index[word, 2] >> 32) + n_bits(index[word, 0] & before)
+    return (index[word, 2] >> 32) + _n_bits(index[word, 0] & before)
 
 
 @njit(cache=True, nogil=True, _nrt=False)
@@ -38,7 +38,7 @@ def is_corner(index, cell):
 def corner_at(index, cell):
     """Return the number of a corner cell among these, in the order of rows."""
     word, before = cell >> 6, (np.int64(1) << (cell & 63)) - 1
-    return (index[word, 2] & 0xFFFFFFFF) + n_bits(index[word, 1] & before)
+    return (index[word, 2] & 0xFFFFFFFF) + _n_bits(index[word, 1] & before)
 
 
 @guarded
