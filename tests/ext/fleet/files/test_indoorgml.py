@@ -3,6 +3,7 @@
 import json
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import jsonschema
@@ -180,6 +181,21 @@ def test_a_room_of_occupied_cells_alone_is_left_out(path):
     hn.ext.fleet.export_indoorgml(topology(classes, np.arange(8) // 4 * np.ones((4, 1), int)), path)
     rooms: Any = hn.ext.fleet.load_indoorgml(path).layers["rooms"]
     assert [name for _, name in rooms.nodes("name")] == ["west"]
+
+
+def test_directions_are_said_to_be_left_out(path):
+    building = house()
+    links = [replace(link, one_way="up") for link in building.links]
+    up = hn.ext.fleet.Building(building.floors, links)
+    assert "lift west ↑: its direction" in hn.ext.fleet.export_indoorgml(up, path)
+    rule = hn.OneWayRule(line=((4, 0), (4, 4)))
+    names = "west", "east"
+    label_of = (np.arange(8) // 4 * np.ones((4, 1), int)).astype(np.int32)
+    labels = hn.RoomLabels(names, label_of, one_way=(rule,))
+    grid = occupancy_grid(np.ones((4, 8), np.uint8))
+    directed = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
+    left_out = hn.ext.fleet.export_indoorgml(directed, path)
+    assert left_out == ("directions of 1 one-way doors and lines",)
 
 
 def test_floors_are_levels_and_a_lift_is_a_transfer_space_on_each(path):

@@ -160,6 +160,11 @@ def test_what_the_format_has_no_place_for_is_said(house, tmp_path):
         "doors: as asked",
     )
     assert not read_rmf(tmp_path / "a.yaml").doors
+    # parse_graph.cpp of open-rmf/rmf_ros2 (rmf_fleet_adapter) joins the floors of a lift both ways.
+    up = replace(house, links=(replace(lift, one_way="up"),))
+    assert hn.ext.fleet.export_rmf(up, tmp_path / "a.yaml") == (
+        "lift east ↑: its direction, Open-RMF takes lifts both ways",
+    )
 
 
 def test_two_lifts_at_one_point_are_refused(house, tmp_path):

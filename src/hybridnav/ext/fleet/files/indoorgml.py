@@ -112,8 +112,9 @@ def export_indoorgml(
     file = NewFile.named(path, "indoor model", "IndoorGML", (".json",))
     split: list[str] = []
     left_out: list[str] = []
+    floors = {"0": source} if isinstance(source, TopologicalMap) else {}
     if isinstance(source, TopologicalMap):
-        model = _model_of(source.grid.name, {"0": source}, split)
+        model = _model_of(source.grid.name, floors, split)
     elif isinstance(source, Building):
         floors = {floor.name: floor.planner.topology for floor in source.floors}
         model = _model_of(Path(path).stem, floors, split)
@@ -125,6 +126,9 @@ def export_indoorgml(
             f"source is {type(source).__name__}, expected a TopologicalMap, a Building or an "
             "IndoorModel"
         )
+    labels = [floor.room_labels for floor in floors.values()]
+    if n_rules := sum(len(each.one_way) for each in labels if each is not None):
+        left_out.append(f"directions of {n_rules} one-way doors and lines")
     if split:
         names = ", ".join(split[:_SHOWN]) + ", ..." * (len(split) > _SHOWN)
         left_out.append(f"all but the largest part of the outlines of {names}")
