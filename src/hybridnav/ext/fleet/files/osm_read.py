@@ -30,6 +30,8 @@ from hybridnav.graphs import WaypointGraph
 from hybridnav.graphs.gather import Findings, Gathered, free_name, number_of, shown
 
 Point = tuple[float, float]
+Points = list[tuple[float, Point]]
+Way = Direction | None
 
 _VERTICAL: dict[str, LinkKind] = {"elevator": "lift", "stairs": "stairs"}
 """Values of `osmAG:areaType` that join levels."""
@@ -264,11 +266,9 @@ class _Links:
         for way in self._data.ways:
             kind = osm.link_kind(way.tags, is_line=not way.is_closed)
             if kind is not None and len(osm.levels_of(way.tags)) > 1:
-                served = self._served_levels(way)
+                name, served = way.tags.get("name", ""), self._served_levels(way)
                 one_way = None if way.is_closed else self._direction(way, served)
-                links.append(
-                    self._link(way.tags.get("name", ""), kind, served, way.tags, one_way=one_way)
-                )
+                links.append(self._link(name, kind, served, way.tags, one_way))
                 if kind != "lift":
                     self._note(links[-1], kind, f"way {way.id}")
             if kind == "lift":
@@ -278,7 +278,7 @@ class _Links:
                 self._note_astray(way)
         return links
 
-    def _direction(self, line: osm.OsmWay, served: list[tuple[float, Point]]) -> Direction | None:
+    def _direction(self, line: osm.OsmWay, served: Points) -> Way:
         """Return the one direction in which a line is taken, as an escalator is; None for both."""
         points = [self._points.get(node) for node in line.refs]
         levels = [level for level, _ in sorted(served, key=lambda each: points.index(each[1]))]
@@ -359,13 +359,7 @@ class _Links:
             self.findings.add("link-unread", f"{kind}, {where}")
 
     def _link(
-        self,
-        name: str,
-        kind: LinkKind,
-        points: list[tuple[float, Point]],
-        tags: dict[str, str],
-        *,
-        one_way: Direction | None = None,
+        self, name: str, kind: LinkKind, points: Points, tags: osm.Tags, one_way: Way = None
     ) -> Link | None:
         """Return a link, None if it stops at fewer than two levels."""
         ends: dict[float, LinkEnd] = {}
