@@ -99,7 +99,10 @@ def recut_rooms(old: Side, new: Side) -> tuple[IntArray, LongArray]:
     number[first] = mains[first]
     label_of: IntArray = np.append(number[part_of], NO_ROOM).astype(np.int32)[piece_of]
     spread(label_of, new.rooms.label_of, label_of.size)
-    label_of = np.where(label_of >= 0, label_of, new.rooms.label_of)
+    # Cells in walls that no step leads to stay, if there still is such a room.
+    still = np.ones(len(new.rooms.names) + 1, np.bool_)
+    still[np.setdiff1d(room_of, number)] = False
+    label_of = np.where((label_of < 0) & still[new.rooms.label_of], new.rooms.label_of, label_of)
     part, room = np.nonzero(shares)
     order = np.argsort(-shares[part, room], kind="stable")
     return label_of, np.stack([room, number[part]], axis=1)[order]
