@@ -105,6 +105,15 @@ def test_neighbours_differ_on_the_maps_of_the_project(name):
     assert_neighbours_differ(hn.find_rooms(grid), grid)
 
 
+def test_many_rooms_have_one_colour_whichever_map_comes_first():
+    """Of many rooms there are ties, which must not hang on the order of the maps."""
+    rng = np.random.default_rng(1)
+    one, other = (rng.permutation(144).reshape(12, 12).repeat(4, 0).repeat(4, 1) for _ in "ab")
+    grid = occupancy_grid(np.ones(one.shape, dtype=np.uint8), resolution_m=0.2)
+    before, now = named(one.astype(np.int32)), named(other.astype(np.int32))
+    assert colour_rooms(before, grid, now).tolist() == colour_rooms(now, grid, before).tolist()
+
+
 def pixel(ax, point):
     """The colour that a picture has at a point of the map, before it is averaged."""
     (cells,) = (image for image in ax.images if image.get_gid() == "cells")
