@@ -4,9 +4,7 @@ The truth is the transform that a later map is made by, and the cells that rooms
 """
 
 import math
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -342,11 +340,9 @@ def test_rooms_of_another_map_are_refused(office):
         carry_names(rooms, grid, "rooms.yaml", grid)  # type: ignore[arg-type]
 
 
-@pytest.mark.skipif("HYBRIDNAV_DATA" not in os.environ, reason="needs the reference data")
-def test_one_site_in_two_years_has_one_frame():
-    data = Path(os.environ["HYBRIDNAV_DATA"]) / "strands"
+def test_one_site_in_two_years_has_one_frame(data):
     old, new = (
-        hn.load_map(data / name, robot_radius_m=0)
+        hn.load_map(data / "strands" / name, robot_radius_m=0)
         for name in ("tsc_y3/tsc20160523.yaml", "tsc_y4/tsc_1701.yaml")
     )
     nothing = [hn.RoomLabels((), np.full(grid.shape, -1)) for grid in (old, new)]

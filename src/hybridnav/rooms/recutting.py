@@ -48,8 +48,7 @@ class Side(NamedTuple):
 
     def is_known(self, points: FloatArray) -> BoolArray:
         """Return whether the map knows what is at points."""
-        classes = self.at(self.grid.measured, points)
-        return (classes == CellClass.FREE) | (classes == CellClass.OCCUPIED)
+        return np.isin(self.at(self.grid.measured, points), (CellClass.FREE, CellClass.OCCUPIED))
 
     def widths(self, piece_of: IntArray, n: int, other: Side) -> tuple[LongArray, FloatArray]:
         """Return how wide pieces touch in places that the other map knows too: `n` times one piece
@@ -100,8 +99,7 @@ def recut_rooms(old: Side, new: Side) -> tuple[IntArray, LongArray]:
     label_of: IntArray = np.append(number[part_of], NO_ROOM).astype(np.int32)[piece_of]
     spread(label_of, new.rooms.label_of, label_of.size)
     # Cells in walls that no step leads to stay, if there still is such a room.
-    still = np.ones(len(new.rooms.names) + 1, np.bool_)
-    still[np.setdiff1d(room_of, number)] = False
+    still = ~np.isin(np.arange(len(new.rooms.names) + 1), np.setdiff1d(room_of, number))
     label_of = np.where((label_of < 0) & still[new.rooms.label_of], new.rooms.label_of, label_of)
     part, room = np.nonzero(shares)
     order = np.argsort(-shares[part, room], kind="stable")
@@ -182,9 +180,8 @@ def _spread(labels: IntArray, region: IntArray, least: float) -> IntArray:
     label_of[region >= 0] = labels
     inner = region >= 0
     for low, high in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-        inner[low] &= (region[high] < 0) | (
-            (label_of[low] == label_of[high]) & (region[low] == region[high])
-        )
+        same = (label_of[low] == label_of[high]) & (region[low] == region[high])
+        inner[low] &= same | (region[high] < 0)
     label_of[_cell_kernels.large_parts(inner, least) < 0] = NO_ROOM
     spread(label_of, region, label_of.size)
     return label_of
