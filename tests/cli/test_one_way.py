@@ -179,3 +179,12 @@ def test_a_building_knows_that_the_way_back_differs(map_file: Path) -> None:
     for start, goal in (((2.5, 1.5), (10.5, 2.5)), ((10.5, 1.5), (2.5, 2.5))):
         one = building.plan(("1", start), ("1", goal))
         assert one.cost == pytest.approx(building.floors[0].planner.distance(start, goal))
+    # What the way back costs on a floor between is kept, and bounds no way there.
+    shut = {"2": {"doors": [1]}}
+    kept = hn.ext.fleet.load_building(building_file, robot_radius_m=0)
+    right, left = (10.5, 1.5), (2.5, 1.5)
+    round_m = kept.floors[1].planner.plan(right, left, blocked=shut["2"]).cost
+    assert kept.plan(("2", right), ("2", left), blocked=shut).cost == round_m > 2 + 8
+    there = kept.plan(("2", left), ("2", right), blocked=shut)
+    assert [ride.from_floor for ride in there.rides] == ["2", "1"]
+    assert there.cost == there.lower_bound == pytest.approx(2 + 8)

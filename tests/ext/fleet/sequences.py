@@ -43,7 +43,7 @@ class Sequence:
     def __init__(self, seed: int, preset: str, folder: Path) -> None:
         self.rng = rng = np.random.default_rng([640, seed])
         self.preset = preset
-        self.frees = [rng.random(SHAPE) > rng.choice([0.05, 0.2]) for _ in FLOORS]
+        self.frees = [rng.random(SHAPE) > rng.choice([0.05, 0.2, 0.4]) for _ in FLOORS]
         has_costs = preset in BY_COSTS and rng.random() < 0.5
         self.factors = [self.random_factors() for _ in FLOORS] if has_costs else []
         self.lines = [[self.random_line() for _ in range(rng.integers(0, 3))] for _ in FLOORS]
@@ -175,7 +175,7 @@ class Sequence:
         sides = [np.empty((0, 4), np.int32), np.empty((0, 4), np.int32)]
         shut = [np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)]
         blocked: dict[str, Any] = {}
-        for index in np.flatnonzero(rng.random(2) < 0.5).tolist():
+        for index in np.flatnonzero(rng.random(2) < 0.3).tolist():
             sides[index] = random_sides(rng, *SHAPE)
             shut[index] = self.frees[index] & (rng.random(SHAPE) < rng.choice([0.0, 0.15]))
             for _, cell in (spot for spot in spots if spot[0] == index):
