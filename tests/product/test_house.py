@@ -47,7 +47,7 @@ BUDGETS = {
     "harness": (9443, 8),
     "maps": (5304, 6),
     "models": (2113, 6),
-    "planning": (6853, 9),
+    "planning": (6856, 9),
     "pyramid": (4445, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),

@@ -243,8 +243,11 @@ def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
         cells = partial(_cells_of, found)
     if points is None:
         return Path(cells, partial(_centres, cells, frame, length_m), length_m)
-    is_one = not (is_of_cells or length_m > 0)
-    return Path(cells, partial(_checked, points[:1] if is_one else points, length_m), length_m)
+    points = points if is_of_cells or length_m > 0 else points[:1]
+    if found.measured_m is None:
+        return Path(cells, partial(_checked, points, length_m), length_m)
+    check_length(length_m, found.measured_m)
+    return Path(cells, partial(made, points), length_m)
 
 
 def _cells_of(found: Found) -> LongArray:

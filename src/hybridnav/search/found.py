@@ -208,6 +208,8 @@ class Found:
     stats: PlanStats = field(default_factory=PlanStats)
     proof: dict[str, Any] | None = None
     """A proof of the answer, for the harness; see `PlanResult.proof`. None for none."""
+    measured_m: float | None = None
+    """Length of the lines between `points`; None to have them measured when they are read."""
 
     @property
     def has_path(self) -> bool:

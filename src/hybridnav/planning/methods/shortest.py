@@ -326,4 +326,4 @@ def _along(
     """
     (points, length_m), (_, length, bound, _) = line, path
     bound_m = min(length_m * (bound / length), length_m) if length else 0.0
-    return Found(cells, length_m, bound_m, points, stats=stats)
+    return Found(cells, length_m, bound_m, points, stats=stats, measured_m=length_m)
