@@ -13,6 +13,7 @@ import hybridnav as hn
 from benchmarks.common import print_head, print_row
 from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.rooms.find import judged_rooms
+from hybridnav.rooms.listing import kinds_of
 from research._rooms_agreement import compare_rooms
 from research._rooms_buildings import SITES, Building
 from research._rooms_views import cost_table, names_table, views_table
@@ -104,9 +105,42 @@ def measures_table(data: Path, out: Path, n_generated: int = 0) -> None:
     given = [building for building in buildings if building.rose2 is not None]
     for shown in ("ROSE2", UNSEEN):
         _print("mean of ROSE2's maps", shown, _mean([rows[b.name, shown] for b in given]))
+    people_table(buildings)
     views_table(buildings, training.without)
     names_table(data)
     cost_table(data)
+
+
+def people_table(buildings: list[Building]) -> None:
+    """Print how well two people's labels of one floor agree, and where they break the rules."""
+    print("\n## Where people disagree\n")
+    intel, again = (b for b in buildings if b.site == "Intel")
+    cells, boxes = np.argwhere(again.compared), []
+    for each in (intel, again):
+        rows, cols = np.nonzero(each.compared)
+        boxes.append(((rows.min(), cols.min()), (rows.max(), cols.max())))
+    (low, high), (begin, end) = np.array(boxes)
+    there = tuple(np.rint(low + (cells - begin) * (high - low) / (end - begin)).astype(int).T)
+    both = intel.compared[there]
+    agreed = compare_rooms(intel.true[there][both], again.true[tuple(cells[both].T)])
+    print(
+        f"{intel.name} and {again.name} show one floor: MCC {agreed.mcc:.3f}, per zone "
+        f"{agreed.mcc_per_zone:.3f}. People's corridors that meet where nothing narrows:\n"
+    )
+    print_head("building", "corridors", "open borders", "between, width in m")
+    for building in buildings:
+        kinds = kinds_of(building.true, building.free, building.grid.resolution_m)
+        is_corridor = np.array([*(k is not None and k.name == "corridor" for k in kinds), False])
+        meet = building.boundaries(building.true)
+        breadths_m = np.full(len(is_corridor), np.inf)
+        for n in np.flatnonzero(is_corridor):
+            depths_m = building.clearance_m[(building.true == n) & building.free]
+            breadths_m[n] = 2 * np.quantile(depths_m, 0.9)
+        narrower_m = breadths_m[meet.labels].min(axis=1)
+        is_open = is_corridor[meet.labels].all(axis=1) & (meet.passages_m >= 0.8 * narrower_m)
+        opened = np.flatnonzero(is_open)
+        shown = (f"{meet.labels[k].tolist()} {meet.widths_m[k]:.1f}" for k in opened)
+        print_row(building.name, is_corridor.sum(), len(opened), "; ".join(shown))
 
 
 def _draw(building: Building, drawn: dict[str, IntArray], out: Path) -> None:
