@@ -4,6 +4,7 @@ share.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from hybridnav.pyramid.kernels import decimation as _kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import hulls as _hull_kernels
 from hybridnav.pyramid.record import MAX_LEVELS, BuildStats, LevelSize
-from hybridnav.pyramid.start import N_CLASSES, Start
+from hybridnav.pyramid.start import N_CLASSES, Start, pieces_of
 
 
 class Scratch(NamedTuple):
@@ -72,8 +73,8 @@ class Scratch(NamedTuple):
         return self.keys.view(np.int32)
 
     @property
-    def new_vertex(self) -> IntArray:
-        """int32 by vertex, its index at the next level."""
+    def merged_into(self) -> IntArray:
+        """int32 by vertex, the one of the next level that it goes into."""
         return self.matched
 
     @property
@@ -129,13 +130,16 @@ class Decimation:
         self._hulls = _NO_HULLS
         self._steering: Steering | None = None
         self.record, self._darts, self._vertices, self._level, self._cols = start
-        self._loops = [0]
+        self._blocks = self._vertices.boxes.copy() if linkage != _kernels.SURVIVOR else None
+        self._merged: list[IntArray] = []
+        self._sizes = [LevelSize(self.n_vertices, len(self._darts.base_edge), 0)]
+        self._pieces = pieces_of(self._vertices, self._darts)
         self._whole_at = int(self._vertices.whole_at.max(initial=0))
         self._scratch = Scratch.of_size(len(self._vertices.cells), len(self._darts.base_edge))
 
     def recall(self, stats: BuildStats) -> None:
         """Take over what is known of the levels up to this one."""
-        self._loops = [size.self_loops for size in stats.sizes[: self._level + 1]]
+        self._sizes = stats.sizes[: self._level + 1]
         self.stats.seconds = dict(stats.seconds)
         self.stats.tops = [self._level]
 
@@ -162,7 +166,7 @@ class Decimation:
     def lift_limit(self) -> None:
         """Let vertices merge however far apart they are."""
         self._limit = NO_LIMIT
-        self._hulls = _NO_HULLS
+        self._hulls, self._blocks = _NO_HULLS, None
 
     def steer(self, steering: Steering) -> None:
         """Let a steering decide from here on which arcs are contracted, in place of distances."""
@@ -191,8 +195,6 @@ class Decimation:
         scratch = self._scratch.for_level(self.n_vertices, len(self._darts.base_edge))
         self._select(scratch, count)
         self._make_level(scratch)
-        origin = self._darts.origin
-        self._loops.append(int((origin[::2] == origin[1::2]).sum()))
         self._lap("compaction")
         return True
 
@@ -202,8 +204,7 @@ class Decimation:
         self._lap("vertices")
         touched, any_loop = dart_kernels.contract(
             self._darts,
-            scratch.parent,
-            scratch.new_vertex,
+            scratch.merged_into,
             scratch.kernel_dart,
             scratch.state,
             scratch.inverse,
@@ -225,6 +226,9 @@ class Decimation:
         )
         self._lap("removal")
         self._close_gaps(scratch)
+        origin = self._darts.origin
+        loops = int((origin[::2] == origin[1::2]).sum()) if any_loop else 0
+        self._sizes.append(LevelSize(self.n_vertices, len(origin) // 2, loops))
 
     def _select(self, scratch: Scratch, count: int) -> None:
         """Choose the stars of this level from its first `count` candidates."""
@@ -284,9 +288,12 @@ class Decimation:
 
     def _start_hulls(self) -> None:
         """Build the hull of every vertex, once bounding boxes no longer decide every edge."""
-        self._hulls = _kernels.Hulls(
-            *_hull_kernels.field_hulls(self.field_of(), self._cols, self._vertices.boxes)
-        )
+        field_of = np.arange(self.n_vertices, dtype=np.int32)
+        for merged_into in reversed(self._merged):
+            field_of = field_of[merged_into]
+        boxes = self._vertices.boxes
+        self._hulls = _kernels.Hulls(*_hull_kernels.block_hulls(self._blocks, field_of, boxes))
+        self._blocks, self._merged = None, []
         self._lap("hulls")
 
     def field_of(self) -> IntArray:
@@ -299,19 +306,20 @@ class Decimation:
         n_vertices = _kernels.compact_vertices(
             self._vertices,
             scratch.parent,
-            scratch.new_vertex,
+            scratch.merged_into,
             self._cols,
             self._level,
             record.vertex_end,
             record.vertex_parent,
         )
         if self._steering is not None:
-            self._steering.merge(scratch.new_vertex[scratch.parent], n_vertices)
+            self._steering.merge(scratch.merged_into.copy(), n_vertices)
         elif len(self._hulls.start):
-            merged_into = scratch.new_vertex[scratch.parent]
             self._hulls = _kernels.Hulls(
-                *_hull_kernels.merged_hulls(*self._hulls, merged_into, n_vertices)
+                *_hull_kernels.merged_hulls(*self._hulls, scratch.merged_into, n_vertices)
             )
+        elif self._blocks is not None:
+            self._merged.append(scratch.merged_into.copy())
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
 
     def _close_gaps(self, scratch: Scratch) -> None:
@@ -324,14 +332,12 @@ class Decimation:
 
     def finish(self) -> None:
         """Record the sizes of all levels."""
-        vertex_ends = _base_kernels.count_bytes(self.record.vertex_end).sum(axis=0)
-        edge_ends = _base_kernels.count_bytes(self.record.edge_end).reshape(2, -1, 2).sum((0, 2))
-        vertices, edges = (
-            ends[::-1].cumsum()[::-1][1:].tolist() for ends in (vertex_ends, edge_ends)
-        )
-        self.stats.sizes = [
-            LevelSize(*size) for size in zip(vertices, edges, self._loops, strict=False)
-        ]
+        for level, (vertices, arcs) in enumerate(self._pieces):
+            size = self._sizes[level]
+            self._sizes[level] = replace(
+                size, vertices=size.vertices + vertices, arcs=size.arcs + arcs
+            )
+        self.stats.sizes = self._sizes
         self._lap("sizes")
 
     def _lap(self, stage: str) -> None:

@@ -326,6 +326,31 @@ def make_templates() -> Templates:
 TEMPLATES = make_templates()
 
 
+def _alive(ends: ByteArray) -> LongArray:
+    """Return how many of some ends, none of which survives, each of the lower levels has."""
+    levels = np.arange(2 * MAX_POWER)[:, None]
+    return ((ends >= 2 * levels + 2) & (ends < SURVIVES)).sum(axis=1)
+
+
+def pieces_of(vertices: Vertices, darts: Darts) -> list[list[int]]:
+    """Return what each level up to that where all blocks are whole has besides a start.
+
+    These are vertices, one less than the pieces of each block, and edges: those inside blocks, and
+    those that the edge on a side stands for.
+    """
+    blocks = np.bincount(vertices.whole_at >> 1, minlength=MAX_POWER + 1)
+    sides = _base_kernels.count_sides(darts.origin, darts.base_edge, vertices.whole_at)
+    found = np.zeros((2 * MAX_POWER, 2), np.int64)
+    for power in range(1, MAX_POWER + 1):
+        pieces = np.maximum(1, 4**power >> np.arange(2 * MAX_POWER)) - 1
+        found[:, 0] += blocks[power] * pieces
+        place = power, slice(1 << power), slice(1 << power)
+        for side, inside, across in zip(sides, TEMPLATES[3:5], TEMPLATES[5:], strict=True):
+            found[:, 1] += blocks[power] * _alive(inside[place].ravel())
+            found[:, 1] += side[power] * _alive(across[place[:2]])
+    return found[: vertices.whole_at.max(initial=0)].tolist()
+
+
 def max_power(limit: int) -> int:
     """Return the power of the largest blocks: at most half the merge distance a side.
 

@@ -231,14 +231,16 @@ def protect_faces(sigma, protected):
 
 
 @njit(cache=True, nogil=True)
-def count_bytes(values):
-    """Count the 256 values at even and at odd places, int64 (2, 256).
+def count_sides(origin, base_edge, whole_at):
+    """Count the edges to the east and to the north, int64 (2, 128), by the lesser power of two
+    blocks.
 
-    There are two counts because increments of one counter in a row wait for each other.
+    `origin`, `base_edge`: see `Darts`; `whole_at`: see `Vertices`.
     """
-    count = np.zeros((2, 256), np.int64)
-    for i in range(values.size):
-        count[i & 1, values[i]] += 1
+    count = np.zeros((2, 128), np.int64)
+    for e in range(base_edge.size):
+        least = min(whole_at[origin[2 * e]], whole_at[origin[2 * e + 1]])
+        count[base_edge[e] & 1, least >> 1] += 1
     return count
 
 

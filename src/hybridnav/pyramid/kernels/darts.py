@@ -61,7 +61,7 @@ def loop_area(dart, sweep, base_edge, cols):
 
 @guarded
 @njit(cache=True, nogil=True, _nrt=False)
-def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touched, cols):
+def contract(darts, merged_into, kernel_dart, state, inverse, shift, touched, cols):
     """Contract the stars of a kernel, in place.
 
     Return how many entries of `touched` are filled, and whether there is a self-loop.
@@ -69,23 +69,23 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
     The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the dart
     after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
 
-    `darts`: `Darts` of the level, changed; `parent`: int32 (n_vertices,), the vertex that each
-    vertex goes into, itself if it survives; `new_vertex`: int32 (n_vertices,), the number of a
-    survivor on the next level; `kernel_dart`: int32 (n_vertices,), the dart that starts at the
-    parent of v and ends at v; `state`: uint8 (n_edges,), receives `ALIVE` or `CONTRACTED`;
-    `inverse`: int32 (n_darts,), receives the inverse of sigma; `shift`: int32 (n_vertices,),
-    scratch; `touched`: int32, receives one dart of every ordinary face that lost a dart: apart from
-    faces with a self-loop, no other face can have become redundant; `cols`: columns of the grid.
+    `darts`: `Darts` of the level, changed; `merged_into`: int32 (n_vertices,), the vertex of the
+    next level that each vertex goes into; `kernel_dart`: int32 (n_vertices,), the dart that starts
+    at the parent of v and ends at v, -1 if v survives; `state`: uint8 (n_edges,), receives `ALIVE`
+    or `CONTRACTED`; `inverse`: int32 (n_darts,), receives the inverse of sigma; `shift`: int32
+    (n_vertices,), scratch; `touched`: int32, receives one dart of every ordinary face that lost a
+    dart: apart from faces with a self-loop, no other face can have become redundant; `cols`:
+    columns of the grid.
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
     protected, base_edge = darts.protected, darts.base_edge
     one = np.uint32(1)
     for e in range(base_edge.size):
         state[e] = ALIVE
-    for v in range(parent.size):
+    for v in range(kernel_dart.size):
         shift[v] = 0
-        if parent[v] != v:
-            dart = kernel_dart[v]
+        dart = kernel_dart[v]
+        if dart >= 0:
             state[dart >> 1] = CONTRACTED
             shift[v] = loop_area(dart, sweep, base_edge, cols)
     count = 0
@@ -104,7 +104,7 @@ def contract(darts, parent, new_vertex, kernel_dart, state, inverse, shift, touc
                     count += 1
             inverse[following] = d
             v = np.uint32(origin[d])
-            origin[d] = new_vertex[np.uint32(parent[v])]
+            origin[d] = merged_into[v]
             sweep[d] += shift[v]
         if origin[2 * e] == origin[2 * e + 1]:
             any_loop = True

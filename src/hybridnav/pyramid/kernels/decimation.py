@@ -337,20 +337,20 @@ def select_stars(
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vertex_parent):
+def compact_vertices(vertices, parent, merged_into, cols, level, vertex_end, vertex_parent):
     """Merge boxes into survivors and close the gaps, in place; return the number of survivors.
 
-    `vertices`: `Vertices` of the level, changed; `parent`, `new_vertex`: int32 (n_vertices,),
-    `new_vertex` is filled in; `cols`: columns of the grid; `level`: number of the level;
-    `vertex_end`, `vertex_parent`: by flat cell: receive the level at which a surviving cell goes,
-    and the cell it goes into.
+    `vertices`: `Vertices` of the level, changed; `parent`, `merged_into`: int32 (n_vertices,), the
+    second receives the vertex of the next level that each one goes into; `cols`: columns of the
+    grid; `level`: number of the level; `vertex_end`, `vertex_parent`: by flat cell: receive the
+    level at which a surviving cell goes, and the cell it goes into.
     """
     cells, boxes, classes, whole_at = vertices
     count = 0
     for v in range(parent.size):
         p = parent[v]
         if p == v:
-            new_vertex[v] = count
+            merged_into[v] = count
             count += 1
         else:
             boxes[p, 0] = min(boxes[p, 0], boxes[v, 0])
@@ -362,12 +362,14 @@ def compact_vertices(vertices, parent, new_vertex, cols, level, vertex_end, vert
             vertex_parent[cell] = cells[p, 0] * cols + cells[p, 1]
     for v in range(parent.size):
         if parent[v] == v:
-            w = new_vertex[v]
+            w = merged_into[v]
             cells[w, 0], cells[w, 1] = cells[v, 0], cells[v, 1]
             for i in range(4):
                 boxes[w, i] = boxes[v, i]
             classes[w] = classes[v]
             whole_at[w] = whole_at[v]
+        else:
+            merged_into[v] = merged_into[parent[v]]
     return count
 
 

@@ -32,23 +32,56 @@ def chain(rows, cols, count, hand, points, start):
 @njit(cache=True, nogil=True)
 def field_hulls(field_of, cols, boxes):
     """Return the convex hulls of connected fields, from the first and last cell of each row."""
-    n_vertices = boxes.shape[0]
-    first_row = np.zeros(n_vertices + 1, np.int64)
-    for v in range(n_vertices):
-        first_row[v + 1] = first_row[v] + boxes[v, 2] - boxes[v, 0] + 1
-    left = np.full(first_row[n_vertices], np.int64(-1), np.int64)
-    right = np.empty(first_row[n_vertices], np.int64)
+    first_row, left, right = rows_of(boxes)
     for row in range(field_of.size // cols):
         for col in range(cols):
             v = field_of[row * cols + col]
             if v >= 0:
                 at = first_row[v] + row - boxes[v, 0]
-                if left[at] < 0:
-                    left[at] = col
+                left[at] = min(left[at], col)
                 right[at] = col
+    return hulls_of_rows(boxes, first_row, left, right)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def block_hulls(blocks, field_of, boxes):
+    """Return the convex hulls of connected fields that are made of blocks.
+
+    `blocks`: int32 (n_blocks, 4), `field_of`: int32 (n_blocks,), the box of each block and its
+    field; `boxes`: int32 (n_vertices, 4), of the fields.
+    """
+    first_row, left, right = rows_of(boxes)
+    for i in range(field_of.size):
+        v = field_of[i]
+        for row in range(blocks[i, 0], blocks[i, 2] + 1):
+            at = first_row[v] + row - boxes[v, 0]
+            left[at] = min(left[at], blocks[i, 1])
+            right[at] = max(right[at], blocks[i, 3])
+    return hulls_of_rows(boxes, first_row, left, right)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def rows_of(boxes):
+    """Return where the rows of each field begin, and arrays for the first and last cell of each."""
+    n_vertices = boxes.shape[0]
+    first_row = np.zeros(n_vertices + 1, np.int64)
+    for v in range(n_vertices):
+        first_row[v + 1] = first_row[v] + boxes[v, 2] - boxes[v, 0] + 1
+    n_rows = first_row[n_vertices]
+    left = np.full(n_rows, np.int32(0x7FFFFFFF), np.int32)
+    return first_row, left, np.full(n_rows, np.int32(-1), np.int32)
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def hulls_of_rows(boxes, first_row, left, right):
+    """Return the convex hulls of fields from the first and last cell of their rows (`rows_of`)."""
+    n_vertices = boxes.shape[0]
     start = np.zeros(n_vertices + 1, np.int64)
-    rows = np.empty(first_row[n_vertices], np.int64)
-    points = np.empty((2 * first_row[n_vertices], 2), np.int32)
+    rows = np.empty(left.size, np.int32)
+    points = np.empty((2 * left.size, 2), np.int32)
     end = 0
     for v in range(n_vertices):
         low, high = first_row[v], first_row[v + 1]
@@ -75,7 +108,7 @@ def merged_hulls(start, points, merged_into, n_vertices):
         first_part[merged_into[part]] = part
     new_start = np.zeros(n_vertices + 1, np.int64)
     hulls = np.empty_like(points)
-    rows, cols = np.empty(points.shape[0], np.int64), np.empty(points.shape[0], np.int64)
+    rows, cols = np.empty(points.shape[0], np.int32), np.empty(points.shape[0], np.int32)
     end = 0
     for v in range(n_vertices):
         part = first_part[v]
