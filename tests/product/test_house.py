@@ -48,7 +48,7 @@ BUDGETS = {
     "maps": (5304, 6),
     "models": (2113, 6),
     "planning": (6856, 9),
-    "pyramid": (4445, 9),
+    "pyramid": (4300, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
     "rooms": (5536, 8),

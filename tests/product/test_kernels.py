@@ -139,7 +139,8 @@ def _is_made(value: ast.expr | None) -> bool:
 
 def uncounted(kernels: list[ast.FunctionDef]) -> list[str]:
     """What makes an array, which is never freed, or returns one, in kernels without counts."""
-    plain = {"min", "max", "abs", "range", "len", "np.int32", "np.int64", "np.uint32", "np.uint64"}
+    plain = {"min", "max", "abs", "range", "len", "np.int32", "np.int64"}
+    plain |= {f"np.uint{bits}" for bits in (8, 16, 32, 64)}
     of = {one for one in kernels if "_nrt=False" in ast.unparse(one.decorator_list[-1])}
     may = plain | {one.name for one in of} - {one.name for one in kernels if one not in of}
     found = []

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.clock import clock
-from hybridnav._base.typing import BoolArray, ByteArray, IntArray, KeyArray
+from hybridnav._base.typing import AnyArray, BoolArray, ByteArray, IntArray, KeyArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.pyramid import CombinatorialMap
 from hybridnav.pyramid.darts import Steering
@@ -35,47 +35,39 @@ class Scratch(NamedTuple):
     state: ByteArray
     best: KeyArray
     matched: IntArray
-    parent: IntArray
+    parent: AnyArray
     kernel_dart: IntArray
     has_leaf: BoolArray
 
     @classmethod
     def of_size(cls, n_vertices: int, n_edges: int) -> Scratch:
         """Return work space for a level of this size, which suits all levels above it."""
-        by_edge, by_vertex = ("u8", "u8", "u1"), ("u8", "i4", "i4", "i4", "?")
+        by_edge, by_vertex = ("u8", "u8", "u1"), ("u8", "i4", "u4", "i4", "?")
         arrays = [np.empty(n_edges, kind) for kind in by_edge]
         return cls._make(arrays + [np.empty(n_vertices, kind) for kind in by_vertex])
 
     def for_level(self, n_vertices: int, n_edges: int) -> Scratch:
         """Return views of the length of a level."""
-        edges, vertices = slice(n_edges), slice(n_vertices)
-        return Scratch(
-            *(self.keys[edges], self.rest[edges], self.state[edges], self.best[vertices]),
-            *(self.matched[vertices], self.parent[vertices], self.kernel_dart[vertices]),
-            self.has_leaf[vertices],
-        )
+        by_edge, by_vertex = self[:3], self[3:]
+        arrays = [array[:n_edges] for array in by_edge]
+        return Scratch._make(arrays + [array[:n_vertices] for array in by_vertex])
 
     # Keys and matching are free once the stars are chosen.
 
     @property
-    def inverse(self) -> IntArray:
-        """int32 by dart, the inverse of sigma."""
-        return self.rest.view(np.int32)
+    def inverse(self) -> AnyArray:
+        """uint32 by dart, the inverse of sigma."""
+        return self.rest.view(np.uint32)
 
     @property
-    def touched(self) -> IntArray:
-        """int32, a dart of each face that contraction has changed."""
-        return self.keys.view(np.int32)
+    def by_edge(self) -> AnyArray:
+        """uint32: darts of the faces that contraction has changed; then by edge its new number."""
+        return self.keys.view(np.uint32)
 
     @property
-    def new_edge(self) -> IntArray:
-        """int32 by edge, its even dart at the next level."""
-        return self.keys.view(np.int32)
-
-    @property
-    def merged_into(self) -> IntArray:
-        """int32 by vertex, the one of the next level that it goes into."""
-        return self.matched
+    def merged_into(self) -> AnyArray:
+        """uint32 by vertex, the one of the next level that it goes into."""
+        return self.matched.view(np.uint32)
 
     @property
     def shift(self) -> IntArray:
@@ -129,9 +121,11 @@ class Decimation:
         self._order = _kernels.Order(*map(np.uint64, numbers))
         self._hulls = _NO_HULLS
         self._steering: Steering | None = None
-        self.record, self._darts, self._vertices, self._level, self._cols = start
+        self.record, darts, self._vertices, self._level, self._cols = start
+        sigma, origin = darts.sigma.view(np.uint32), darts.origin.view(np.uint32)
+        self._darts = darts._replace(sigma=sigma, origin=origin)
         self._blocks = self._vertices.boxes.copy() if linkage != _kernels.SURVIVOR else None
-        self._merged: list[IntArray] = []
+        self._merged: list[AnyArray] = []
         self._sizes = [LevelSize(self.n_vertices, len(self._darts.base_edge), 0)]
         self._pieces = pieces_of(self._vertices, self._darts)
         self._whole_at = int(self._vertices.whole_at.max(initial=0))
@@ -151,7 +145,8 @@ class Decimation:
     def plane_map(self) -> CombinatorialMap:
         """Return the current level as a plane map of its own."""
         sigma, origin, _, protected, base_edge, _ = (array.copy() for array in self._darts)
-        return CombinatorialMap(sigma, origin, protected, base_edge, self.n_vertices)
+        darts = sigma.view(np.int32), origin.view(np.int32)
+        return CombinatorialMap(*darts, protected, base_edge, self.n_vertices)
 
     def exhaust(self) -> None:
         """Contract until no edge may be contracted, and record the level reached."""
@@ -202,27 +197,15 @@ class Decimation:
         """Contract the chosen stars and remove the edges that this makes redundant."""
         self._merge_vertices(scratch)
         self._lap("vertices")
+        merged, by_edge = scratch.merged_into, (scratch.state, scratch.inverse)
+        more = scratch.shift, scratch.by_edge, self._cols
         touched, any_loop = dart_kernels.contract(
-            self._darts,
-            scratch.merged_into,
-            scratch.kernel_dart,
-            scratch.state,
-            scratch.inverse,
-            scratch.shift,
-            scratch.touched,
-            self._cols,
+            self._darts, merged, scratch.kernel_dart, *by_edge, *more
         )
         self._lap("contraction")
+        level = self._vertices.whole_at, self._level, self._level > self._whole_at
         dart_kernels.simplify(
-            self._darts,
-            scratch.touched[:touched],
-            any_loop,
-            scratch.state,
-            scratch.inverse,
-            self._cols,
-            self._vertices.whole_at,
-            self._level,
-            self._level > self._whole_at,
+            self._darts, scratch.by_edge[:touched], any_loop, *by_edge, self._cols, *level
         )
         self._lap("removal")
         self._close_gaps(scratch)
@@ -236,19 +219,11 @@ class Decimation:
         _kernels.match(darts.origin, keys, scratch.best, scratch.matched, scratch.rest)
         self._lap("matching")
         stars = (scratch.parent, scratch.kernel_dart, scratch.has_leaf)
-        _kernels.select_stars(
-            darts.origin,
-            darts.base_edge,
-            keys,
-            scratch.state,
-            scratch.matched,
-            scratch.best,
-            self._vertices,
-            self._order,
-            stars,
-        )
+        chosen = keys, scratch.state, scratch.matched, scratch.best
+        of_level = darts.origin, darts.base_edge, *chosen, self._vertices
+        _kernels.select_stars(*of_level, self._order, stars)
         if self._steering is not None:
-            self._steering.refuse_leaves(scratch.parent, scratch.kernel_dart)
+            self._steering.refuse_leaves(scratch.parent.view(np.int32), scratch.kernel_dart)
         elif self._linkage == _kernels.DIAMETER and len(self._hulls.start):
             _kernels.refuse_leaves(
                 scratch.parent, scratch.kernel_dart, scratch.matched, self._hulls, self._limit
@@ -291,10 +266,23 @@ class Decimation:
         field_of = np.arange(self.n_vertices, dtype=np.int32)
         for merged_into in reversed(self._merged):
             field_of = field_of[merged_into]
-        boxes = self._vertices.boxes
-        self._hulls = _kernels.Hulls(*_hull_kernels.block_hulls(self._blocks, field_of, boxes))
-        self._blocks, self._merged = None, []
+        self._merged = []
+        self._make_hulls(field_of)
         self._lap("hulls")
+
+    def _make_hulls(self, field_of_block: IntArray) -> None:
+        """Make hulls from blocks, and blocks of one row from these; only diameters need less."""
+        boxes = self._vertices.boxes
+        first_row, rows, self._field_of_block = _hull_kernels.block_rows(
+            self._blocks, field_of_block, boxes
+        )
+        self._blocks = rows
+        self._hulls = _kernels.Hulls(2 * first_row, rows.reshape(-1, 2))
+        if self._linkage == _kernels.DIAMETER:
+            left, right = rows[:, 1].copy(), rows[:, 3].copy()
+            self._hulls = _kernels.Hulls(
+                *_hull_kernels.hulls_of_rows(boxes, first_row, left, right)
+            )
 
     def field_of(self) -> IntArray:
         """Return the current vertex of each flat cell, int32 (n_cells,), -1 for none."""
@@ -302,29 +290,22 @@ class Decimation:
         return _field_kernels.label_fields(record.vertex_end, record.vertex_parent, MAX_LEVELS)[0]
 
     def _merge_vertices(self, scratch: Scratch) -> None:
-        record = self.record
+        merged = scratch.parent, scratch.merged_into
+        ends = self.record.vertex_end, self.record.vertex_parent
         n_vertices = _kernels.compact_vertices(
-            self._vertices,
-            scratch.parent,
-            scratch.merged_into,
-            self._cols,
-            self._level,
-            record.vertex_end,
-            record.vertex_parent,
+            self._vertices, *merged, self._cols, self._level, *ends
         )
         if self._steering is not None:
-            self._steering.merge(scratch.merged_into.copy(), n_vertices)
-        elif len(self._hulls.start):
-            self._hulls = _kernels.Hulls(
-                *_hull_kernels.merged_hulls(*self._hulls, scratch.merged_into, n_vertices)
-            )
-        elif self._blocks is not None:
+            self._steering.merge(scratch.merged_into.astype(np.int32), n_vertices)
+        elif self._blocks is not None and not len(self._hulls.start):
             self._merged.append(scratch.merged_into.copy())
         self._vertices = _kernels.Vertices(*(array[:n_vertices] for array in self._vertices))
+        if len(self._hulls.start):
+            self._make_hulls(scratch.merged_into[self._field_of_block])
 
     def _close_gaps(self, scratch: Scratch) -> None:
         n_edges = dart_kernels.compact_darts(
-            self._darts, scratch.state, scratch.new_edge, self._level, self.record.edge_end
+            self._darts, scratch.state, scratch.by_edge, self._level, self.record.edge_end
         )
         *by_dart, base_edge, waits = self._darts
         kept = *(array[: 2 * n_edges] for array in by_dart), base_edge[:n_edges], waits[:n_edges]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
-from hybridnav.pyramid.kernels.fields import edges_to_rim, find_cracks
+from hybridnav.pyramid.kernels.fields import crack_classes, edges_to_rim
 
 __all__ = [
     "boundaries_of",
@@ -17,6 +17,23 @@ __all__ = [
     "middles_of",
     "sides_of",
 ]
+
+
+def find_cracks(field_of: IntArray, rows: int, cols: int) -> tuple[LongArray, LongArray]:
+    """Return the base edges between cells of different fields, ascending, and the class of each.
+
+    Two cracks belong to one class when they lie in the same full 2x2 block that holds exactly two
+    cracks; the class is the position of one of its cracks.
+    """
+    fields = field_of.reshape(rows, cols)
+    is_crack = np.zeros((rows, cols, 2), np.bool_)
+    is_crack[:, :-1, 0] = fields[:, :-1] != fields[:, 1:]
+    is_crack[:-1, :, 1] = fields[:-1] != fields[1:]
+    is_crack[fields < 0] = False
+    is_crack[:, :-1, 0] &= fields[:, 1:] >= 0
+    is_crack[:-1, :, 1] &= fields[1:] >= 0
+    cracks = np.flatnonzero(is_crack)
+    return cracks, crack_classes(cracks, field_of, rows, cols)
 
 
 def endpoints_of(base_edges: LongArray, cols: int) -> tuple[LongArray, LongArray]:

@@ -81,15 +81,15 @@ def decimate(  # noqa: PLR0913 - each criterion of merging is an argument of its
         parts = parts_of(classes, limit)
     parted = clock()
     if parts is not None:
-        kinds = parts.kinds
+        start, part_of = start_at_base(parts.kinds, limit), parts.part_of
     else:
-        kinds = classes if labels is None else kinds_of(classes, labels)
-    start = start_at_base(kinds, limit)
+        start = start_at_base(classes if labels is None else kinds_of(classes, labels), limit)
     run = Decimation(start, seed, _LINKAGES[linkage], limit)
     run.stats.seconds |= {"parts": parted - began, "base": clock() - parted}
     if parts is not None:
+        del parts  # three bytes a cell
         run.contract_all()
-        run.rename_rooms(parts.part_of)
+        run.rename_rooms(part_of)
     run.exhaust()
     places = run.plane_map()
     if labels is not None:

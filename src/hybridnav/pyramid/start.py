@@ -13,10 +13,11 @@ from hybridnav.pyramid.darts import Darts
 from hybridnav.pyramid.kernels import base as _base_kernels
 from hybridnav.pyramid.kernels import fields as _field_kernels
 from hybridnav.pyramid.kernels import throats as _throat_kernels
+from hybridnav.pyramid.kernels.base import Merging
 from hybridnav.pyramid.kernels.darts import NO_LEVEL
 from hybridnav.pyramid.kernels.decimation import Vertices
 from hybridnav.pyramid.level import Level
-from hybridnav.pyramid.record import SURVIVES, Record
+from hybridnav.pyramid.record import Record
 
 KindArray = NDArray[np.uint8] | NDArray[np.uint16] | NDArray[np.int32]
 
@@ -119,44 +120,6 @@ def parts_of(classes: ByteArray, limit: int) -> Parts:
     return Parts(classes, *_throat_kernels.divide(classes, clearance, most, small, slight, _DEPTH))
 
 
-class Blocks(NamedTuple):
-    """The blocks of a base."""
-
-    record: Record
-    """The record for the blocks alone; all else survives."""
-    power: ByteArray
-    """See `block_powers`."""
-    new_edge: IntArray
-    """int32 by base edge, the number of each edge between blocks."""
-    n_vertices: int
-    """Blocks and single cells."""
-    n_edges: int
-    """Edges between them."""
-
-
-def mark_blocks(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = None) -> Blocks:
-    """Fill the record for the blocks of the base; see `start_at_base` for the parameters."""
-    record = Record(
-        np.empty(kinds.size, np.uint8),
-        np.empty(kinds.size, np.int32),
-        np.empty(2 * kinds.size, np.uint8),
-    )
-    power = block_powers(kinds if in_blocks is None else in_blocks, max_power(limit))
-    new_edge = np.empty(2 * kinds.size, np.int32)
-    n_vertices, n_edges = _base_kernels.mark_base(
-        kinds,
-        power,
-        _base_kernels.BaseTemplates(
-            TEMPLATES.vertex_end, steps_to_parents(kinds.shape[1]), *TEMPLATES[3:]
-        ),
-        record.vertex_end,
-        record.vertex_parent,
-        record.edge_end,
-        new_edge,
-    )
-    return Blocks(record, power, new_edge, n_vertices, n_edges)
-
-
 def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None = None) -> Start:
     """Fill the record for the blocks of the base, and return their darts and vertices.
 
@@ -164,12 +127,26 @@ def start_at_base(kinds: KindArray, limit: int, *, in_blocks: KindArray | None =
     block is wider than half of it; `in_blocks`: the kinds of the cells that may lie in blocks, 0
     elsewhere; None for all cells.
     """
-    marked = mark_blocks(kinds, limit, in_blocks=in_blocks)
-    record, power, new_edge, n_vertices, n_edges = marked
-    vertices = Vertices(*_base_kernels.block_vertices(kinds, power, record.vertex_end, n_vertices))
-    first, last = _base_kernels.block_darts(kinds, power, vertices, new_edge, n_edges)
-    darts = Darts._make((*first, *last, np.full(n_edges, NO_LEVEL, np.uint8)))
-    return Start(record, darts, vertices, 0, kinds.shape[1])
+    rows, cols = kinds.shape
+    # In whole words, of which the last may have bytes of no cell.
+    vertex_words, edge_words = (
+        np.zeros(-(-kinds.size // 8), np.uint64),
+        np.zeros(-(-kinds.size // 4), np.uint64),
+    )
+    record = Record(
+        vertex_words.view(np.uint8)[: kinds.size],
+        np.empty(kinds.size, np.int32),
+        edge_words.view(np.uint8)[: 2 * kinds.size],
+    )
+    power = block_powers(kinds if in_blocks is None else in_blocks, max_power(limit))
+    merging = merging_of(rows, cols), merging_of(cols, 1)
+    _base_kernels.mark_base(kinds, power, *merging, *vars(record).values())
+    survivors, _ = _base_kernels.surviving(vertex_words)
+    base_edge, before = _base_kernels.surviving(edge_words)
+    vertices = Vertices(*_base_kernels.block_vertices(kinds, power, survivors))
+    darts = _base_kernels.block_darts(kinds, power, vertices, len(base_edge), edge_words, before)
+    waits = np.full(len(base_edge), NO_LEVEL, np.uint8)
+    return Start(record, Darts._make((*darts, base_edge, waits)), vertices, 0, cols)
 
 
 def start_at_level(level: Level, record: Record, kinds: KindArray) -> Start:
@@ -217,24 +194,6 @@ PERIOD = 2 << MAX_POWER
 """Rows after which blocks lie as before: their survivors depend on whether their number is odd."""
 
 
-class Templates(NamedTuple):
-    """Ends of cells and edges by the power p of their block (side 2^p) and their place in it.
-
-    `vertex_end`, and `parent_rows` and `parent_cols`, the steps to the parent, are indexed by
-    (p, row mod 16, col mod 16). The other arrays hold ends of edges as `Record.edge_end` does:
-    `inside_*` by (p, row mod 8, col mod 8), 0 for an edge that leaves the block; `across_*`, for
-    edges that leave it, by (lesser power, row or column mod 8).
-    """
-
-    vertex_end: ByteArray
-    parent_rows: LongArray
-    parent_cols: LongArray
-    inside_east: ByteArray
-    inside_north: ByteArray
-    across_east: ByteArray
-    across_north: ByteArray
-
-
 def survivor_offset(power: int, number: int) -> int:
     """Return the row or column of the surviving cell in a block.
 
@@ -264,91 +223,35 @@ def _death(position: int) -> int:
 
 
 def _twos(number: int) -> int:
-    """Return how often two divides a positive number."""
-    return (number & -number).bit_length() - 1
+    """Return how often two divides a number, at most 4; 4 for 0."""
+    return (number & -number or PERIOD).bit_length() - 1
 
 
-def _across(power: int, position: int, *, upright: bool) -> int:
-    """Return the end of an edge between two blocks by its place along the border.
-
-    Parallel edges go when the cells beside each other are merged on both sides.
-    """
-    place = position % (1 << power)
-    if place == 0:
-        return SURVIVES
-    level = 2 * _twos(place) + (2 if upright else 1)
-    return 2 * level + 1
+def merging_of(count: int, stride: int) -> Merging:
+    """Return how so many rows or columns merge; `stride`: flat cells from one to the next."""
+    numbers = range(PERIOD)
+    deaths = [_death(number) for number in numbers]
+    steps = [survivor_at(death, k) - k for k, death in enumerate(deaths)]
+    of_period = [_twos(k) for k in numbers], [_twos(k + 1) for k in numbers], deaths
+    fields = [np.resize(np.array(values, np.uint8), count) for values in of_period]
+    return Merging._make([*fields, np.resize(np.array(steps, np.int32) * stride, count)])
 
 
-def _inside(power: int, along: int, across: int, *, upright: bool) -> int:
-    """Return the end of an edge from `along` to the next cell inside a block, at `across`.
-
-    It is the end of an edge between the two halves that it joins; it is contracted where they keep
-    it.
-    """
-    if (along + 1) % (1 << power) == 0:
-        return 0
-    halves = _twos(along + 1)
-    end = _across(halves if upright else halves + 1, across, upright=upright)
-    return 2 * (2 * halves + (1 if upright else 2)) if end == SURVIVES else end
-
-
-def make_templates() -> Templates:
-    """Fill the tables."""
-    powers, width = MAX_POWER + 1, 1 << MAX_POWER
-    vertex_end = np.full((powers, PERIOD, PERIOD), SURVIVES, np.uint8)
-    parent_rows = np.zeros((powers, PERIOD, PERIOD), np.int64)
-    parent_cols = np.zeros((powers, PERIOD, PERIOD), np.int64)
-    inside_east = np.zeros((powers, width, width), np.uint8)
-    inside_north = np.zeros((powers, width, width), np.uint8)
-    for power, row, col in np.ndindex(powers, PERIOD, PERIOD):
-        by_row, by_col = _death(row), _death(col)
-        if by_col <= min(power, by_row):
-            vertex_end[power, row, col] = 2 * by_col - 1
-            parent_cols[power, row, col] = survivor_at(by_col, col) - col
-        elif by_row <= power:
-            vertex_end[power, row, col] = 2 * by_row
-            parent_rows[power, row, col] = survivor_at(by_row, row) - row
-    for power, row, col in np.ndindex(powers, width, width):
-        inside_east[power, row, col] = _inside(power, col, row, upright=True)
-        inside_north[power, row, col] = _inside(power, row, col, upright=False)
-    across_east, across_north = (
-        np.array(
-            [[_across(p, i, upright=u) for i in range(width)] for p in range(powers)], np.uint8
-        )
-        for u in (True, False)
-    )
-    return Templates(
-        vertex_end, parent_rows, parent_cols, inside_east, inside_north, across_east, across_north
-    )
-
-
-TEMPLATES = make_templates()
-
-
-def _alive(ends: ByteArray) -> LongArray:
-    """Return how many of some ends, none of which survives, each of the lower levels has."""
-    levels = np.arange(2 * MAX_POWER)[:, None]
-    return ((ends >= 2 * levels + 2) & (ends < SURVIVES)).sum(axis=1)
-
-
-def pieces_of(vertices: Vertices, darts: Darts) -> list[list[int]]:
-    """Return what each level up to that where all blocks are whole has besides a start.
+def pieces_of(vertices: Vertices, darts: Darts) -> list[tuple[int, int]]:
+    """Return what each level below that where all blocks are whole has besides a start.
 
     These are vertices, one less than the pieces of each block, and edges: those inside blocks, and
     those that the edge on a side stands for.
     """
+    powers = np.arange(MAX_POWER + 1)
     blocks = np.bincount(vertices.whole_at >> 1, minlength=MAX_POWER + 1)
-    sides = _base_kernels.count_sides(darts.origin, darts.base_edge, vertices.whole_at)
-    found = np.zeros((2 * MAX_POWER, 2), np.int64)
-    for power in range(1, MAX_POWER + 1):
-        pieces = np.maximum(1, 4**power >> np.arange(2 * MAX_POWER)) - 1
-        found[:, 0] += blocks[power] * pieces
-        place = power, slice(1 << power), slice(1 << power)
-        for side, inside, across in zip(sides, TEMPLATES[3:5], TEMPLATES[5:], strict=True):
-            found[:, 1] += blocks[power] * _alive(inside[place].ravel())
-            found[:, 1] += side[power] * _alive(across[place[:2]])
-    return found[: vertices.whole_at.max(initial=0)].tolist()
+    east, north = _base_kernels.count_sides(darts.origin, darts.base_edge, vertices.whole_at)
+    found = []
+    for level in range(vertices.whole_at.max(initial=0)):
+        rows, cols = (1 << np.maximum(powers - (level + odd) // 2, 0) for odd in (0, 1))
+        arcs = blocks @ (2 * rows * cols - rows - cols) + east @ (rows - 1) + north @ (cols - 1)
+        found.append((int(blocks @ (rows * cols - 1)), int(arcs)))
+    return found
 
 
 def max_power(limit: int) -> int:
@@ -358,15 +261,6 @@ def max_power(limit: int) -> int:
     `limit` is the squared distance in cells.
     """
     return sum(4 << 2 * power <= limit for power in range(1, MAX_POWER + 1))
-
-
-def steps_to_parents(cols: int) -> LongArray:
-    """Return the steps from each cell to the one it is contracted into.
-
-    They are differences of flat cells on a map with `cols` columns: int64, by power and place as
-    `Templates.parent_rows`.
-    """
-    return TEMPLATES.parent_rows * cols + TEMPLATES.parent_cols
 
 
 def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
@@ -381,5 +275,8 @@ def block_powers(kinds: AnyArray, largest: int) -> ByteArray:
     for p in range(1, largest + 1):
         halves, squares = squares, _base_kernels.uniform_squares(squares)
         squares.flags.writeable = False  # like the kinds, so that one compilation serves both
-        _base_kernels.raise_powers(power, squares, halves, p)
+        if p == 1:
+            power[:-1, :-1] = squares != 0
+        else:
+            _base_kernels.raise_powers(power, halves, p)
     return power

@@ -8,9 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav.pyramid.kernels.darts import protect_faces
 from hybridnav.pyramid.kernels.decimation import FIRST_MAY_SURVIVE, SECOND_MAY_SURVIVE
 
 _SURVIVES = 255
+_POWERS = 4
+"""Powers of blocks, 0 for single cells."""
+_HIGH = np.uint64(0x8080808080808080)
+_LOW = np.uint64(0x0101010101010101)
 
 
 @njit(cache=True, nogil=True)
@@ -30,146 +35,243 @@ def uniform_squares(classes):
     return squares
 
 
-@njit(cache=True, nogil=True, _nrt=False)
-def amid_its_class(halves, row, col):
-    """Return whether the 4x4 squares of half the side round a square are all of one class."""
-    if row == 0 or col == 0 or 2 * row + 2 >= halves.shape[0] or 2 * col + 2 >= halves.shape[1]:
-        return False
-    of_class = halves[2 * row, 2 * col]
-    for i in range(2 * row - 1, 2 * row + 3):
-        for j in range(2 * col - 1, 2 * col + 3):
-            if halves[i, j] != of_class:
-                return False
-    return of_class != 0
-
-
-@njit(cache=True, nogil=True, _nrt=False)
-def raise_powers(power, squares, halves, p):
+@njit(cache=True, nogil=True)
+def raise_powers(power, halves, p):
     """Put the cells of squares of power p that are amid their class into blocks of that power.
 
-    `squares` and `halves` are `uniform_squares` of this power and of the one below.
+    The 4x4 squares of half the side round one are all of its class. `halves`: `uniform_squares` of
+    the power below.
     """
+    rows, cols = halves.shape
     width = 1 << (p - 1)
-    for row in range(squares.shape[0]):
-        for col in range(squares.shape[1]):
-            if squares[row, col] != 0 and (p == 1 or amid_its_class(halves, row, col)):
+    alike = np.zeros((rows, cols >> 1), np.bool_)  # four side by side
+    for row in range(rows):
+        of_row, marks = halves[row], alike[row]
+        for col in range(1, cols - 1 >> 1):
+            one = of_row[2 * col]
+            beside = (of_row[2 * col - 1] == one) & (of_row[2 * col + 1] == one)
+            marks[col] = (one != 0) & beside & (of_row[2 * col + 2] == one)
+    for row in range(1, rows - 1 >> 1):
+        for col in range(1, cols - 1 >> 1):
+            one = halves[2 * row, 2 * col]
+            is_amid = True
+            for i in range(2 * row - 1, 2 * row + 3):
+                is_amid &= alike[i, col] & (halves[i, 2 * col] == one)
+            if is_amid:
                 for i in range(row * width, (row + 1) * width):
                     for j in range(col * width, (col + 1) * width):
                         power[i, j] = p
 
 
-class BaseTemplates(NamedTuple):
-    """`Templates` on one map."""
+class Merging(NamedTuple):
+    """When rows, or columns, of cells merge along the quadtree, by their number.
 
-    vertex_end: np.ndarray
-    """The level at which a cell joins its parent, by its place in its block."""
-    parent: np.ndarray
-    """int64, `steps_to_parents`."""
-    inside_east: np.ndarray
-    """The end of the edge to the east inside a block."""
-    inside_north: np.ndarray
-    """To the north."""
-    across_east: np.ndarray
-    """The end of the edge to the next block in the east."""
-    across_north: np.ndarray
-    """In the north."""
-
-
-@guarded
-@njit(cache=True, nogil=True, _nrt=False)
-def mark_base(classes, power, templates, vertex_end, vertex_parent, edge_end, new_edge):
-    """Fill the record for the blocks alone; return the counts of their vertices and edges.
-
-    `classes`: (rows, cols), the kinds of cells, 0 for none; `power`: the powers of blocks, see
-    `block_powers`; `templates`: `BaseTemplates`; `vertex_end`, `vertex_parent`: by flat cell, the
-    record of vertices, filled in; `edge_end`: by base edge, the record of edges, filled in;
-    `new_edge`: int32 by base edge, receives the new numbers of the edges that stay.
+    Arrays are uint8 (n,) but for `step`. "Twos" of a number is how often two divides it, at most 4;
+    4 for 0.
     """
-    ends, parent = templates.vertex_end, templates.parent
-    inside_east, inside_north = templates.inside_east, templates.inside_north
-    across_east, across_north = templates.across_east, templates.across_north
-    rows, cols = classes.shape
-    n_vertices = 0
-    n_edges = 0
+
+    twos: np.ndarray
+    """Twos of the number."""
+    after: np.ndarray
+    """Twos of the next one: less than the power of a block that holds both."""
+    death: np.ndarray
+    """The least power of a block over it whose surviving one is another, 4 for none."""
+    step: np.ndarray
+    """int32, from there to the surviving one of that block, in flat cells."""
+
+
+@njit(cache=True, nogil=True)
+def mark_base(kinds, power, by_row, by_col, vertex_end, vertex_parent, edge_end):
+    """Fill the record for the blocks alone.
+
+    Cells, and edges inside a block, go with halves of the quadtree: two columns, 2^j apart, merge
+    at level 2j + 1, two rows at level 2j + 2. Of parallel edges to the east the one at the lowest
+    row stays, the others go as their rows merge; to the north likewise by columns. There is no
+    branch, so that many cells of a row are one instruction.
+
+    `kinds`: (rows, cols), the kinds of cells, 0 for none; `power`: see `start.block_powers`;
+    `by_row`, `by_col`: `Merging` of the rows and columns; `vertex_end`, `vertex_parent`,
+    `edge_end`: the record, filled in.
+    """
+    rows, cols = kinds.shape
+    # This row and the next one in turn, with a column more.
+    filled, powers = np.zeros((2, cols + 1), np.bool_), np.zeros((2, cols + 1), np.uint8)
+    spread_row(kinds[0], power[0], filled[0], powers[0])
     for row in range(rows):
-        for col in range(cols):
-            cell = row * cols + col
-            if classes[row, col] == 0:
-                vertex_end[cell] = edge_end[2 * cell] = edge_end[2 * cell + 1] = 0
-                vertex_parent[cell] = -1
-                continue
-            p = power[row >> 1, col >> 1]
-            end = ends[p, row & 15, col & 15]
-            vertex_end[cell] = end
-            if end == _SURVIVES:
-                vertex_parent[cell] = -1
-                n_vertices += 1
-            else:
-                vertex_parent[cell] = cell + parent[p, row & 15, col & 15]
-            end = inside_east[p, row & 7, col & 7]
-            if end == 0 and col + 1 < cols and classes[row, col + 1] != 0:
-                end = across_east[min(p, power[row >> 1, (col + 1) >> 1]), row & 7]
-                if end == _SURVIVES:
-                    new_edge[2 * cell] = n_edges
-                    n_edges += 1
-            edge_end[2 * cell] = end
-            end = inside_north[p, row & 7, col & 7]
-            if end == 0 and row + 1 < rows and classes[row + 1, col] != 0:
-                end = across_north[min(p, power[(row + 1) >> 1, col >> 1]), col & 7]
-                if end == _SURVIVES:
-                    new_edge[2 * cell + 1] = n_edges
-                    n_edges += 1
-            edge_end[2 * cell + 1] = end
-    return n_vertices, n_edges
+        here, above = row & 1, ~row & 1
+        if row + 1 < rows:
+            spread_row(kinds[row + 1], power[row + 1 >> 1], filled[above], powers[above])
+        else:
+            filled[above] = False
+        begin, end = row * cols, (row + 1) * cols
+        ends, edges = vertex_end[begin:end], edge_end[2 * begin : 2 * end]
+        mark_vertices(filled[here], powers[here], by_row.death[row], by_col.death, ends)
+        set_parents(ends, begin, by_row.step[row], by_col.step, vertex_parent[begin:end])
+        of_row = by_row.twos[row], by_row.after[row]
+        mark_edges(
+            (filled[here], powers[here]), (filled[above], powers[above]), of_row, by_col, edges
+        )
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def filled(classes, row, col):
-    """Return whether a cell lies on the map and is a vertex."""
-    rows, cols = classes.shape
-    return 0 <= row < rows and 0 <= col < cols and classes[row, col] != 0
+def spread_row(kinds, power, filled, powers):
+    """Fill in which cells of a row are vertices, and the power of the block of each."""
+    for col in range(kinds.size):
+        filled[col] = kinds[col] != 0
+    for i in range(kinds.size >> 1):
+        powers[2 * i] = powers[2 * i + 1] = power[i]
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def mark_vertices(filled, powers, row_death, death, ends):
+    """Fill in the ends of the cells of a row."""
+    by_row = np.uint8(2 * row_death)
+    for col in range(ends.size):
+        by_col = np.uint8(2 * death[col] - 1)
+        end = by_row if row_death <= powers[col] else np.uint8(_SURVIVES)
+        end = by_col if death[col] <= min(powers[col], row_death) else end
+        ends[col] = end if filled[col] else np.uint8(0)
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def set_parents(ends, first, row_step, step, parents):
+    """Fill in the parents of the cells of a row, which begins at the flat cell `first`."""
+    for col in range(ends.size):
+        parent = np.int32(first + col) + (step[col] if ends[col] & 1 else row_step)
+        parents[col] = -1 if ends[col] == 0 or ends[col] == _SURVIVES else parent
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def mark_edges(here, above, of_row, by_col, edges):
+    """Fill in the ends of the edges of a row to the east and to the north.
+
+    `here`, `above`: which cells of this row and of the next one are vertices, and the powers of
+    their blocks; `of_row`: `twos` and `after` of the row; `by_col`: `Merging` of the columns.
+    """
+    filled, powers = here
+    filled_above, powers_above = above
+    row_twos, row_after = of_row
+    twos, after = by_col.twos, by_col.after
+    all_stay = np.uint8(_SURVIVES)
+    for col in range(twos.size):
+        power = powers[col]
+        inside = after[col] < power
+        side = after[col] if inside else min(power, powers[col + 1])
+        end = np.uint8(4 * after[col] + 2) if inside else all_stay
+        end = np.uint8(4 * row_twos + 5) if row_twos < side else end
+        edges[2 * col] = end if filled[col] & filled[col + 1] else np.uint8(0)
+        inside = row_after < power
+        side = np.uint8(row_after + 1) if inside else min(power, powers_above[col])
+        end = np.uint8(4 * row_after + 4) if inside else all_stay
+        end = np.uint8(4 * twos[col] + 3) if twos[col] < side else end
+        edges[2 * col + 1] = end if filled[col] & filled_above[col] else np.uint8(0)
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def block_vertices(classes, power, vertex_end, n_vertices):
-    """Return the vertices of blocks and single cells, in the order of surviving cells."""
-    cols = classes.shape[1]
-    cells = np.empty((n_vertices, 2), np.int32)
-    boxes = np.empty((n_vertices, 4), np.int32)
-    of_class = np.empty(n_vertices, classes.dtype)
-    whole_at = np.empty(n_vertices, np.uint8)
-    v = 0
-    for cell in range(vertex_end.size):
-        if vertex_end[cell] != _SURVIVES:
-            continue
-        row, col = cell // cols, cell % cols
+def surviving(words):
+    """Return the places of the bytes that are 255, int32, and how many come before each word.
+
+    `words`: uint64, eight bytes each; those that are not 255 are below 128.
+    """
+    before = np.empty(words.size, np.int32)
+    count = 0
+    for i in range(words.size):
+        before[i] = count
+        count += count_high(words[i])
+    places = np.empty(count, np.int32)
+    count = 0
+    for i in range(words.size):
+        left = words[i] & _HIGH
+        while left != 0:
+            below = left - np.uint64(1)
+            places[count] = 8 * i + count_high(below & ~left)  # the bytes below the lowest one
+            count += 1
+            left &= below
+    return places, before
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def count_high(word):
+    """Return the number of bytes of a word that are 128 or more."""
+    return np.int64(((word & _HIGH) >> np.uint64(7)) * _LOW >> np.uint64(56))
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def number_of(edge, words, before):
+    """Return the number of a base edge that survives; see `surviving`."""
+    below = (np.uint64(1) << np.uint64(8 * (edge & 7))) - np.uint64(1)
+    return before[edge >> 3] + count_high(words[edge >> 3] & below)
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def filled(kinds, row, col):
+    """Return whether a cell lies on the map and is a vertex."""
+    rows, cols = kinds.shape
+    return 0 <= row < rows and 0 <= col < cols and kinds[row, col] != 0
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def block_vertices(kinds, power, survivors):
+    """Return the vertices of blocks and single cells, int32 (n,) flat surviving cells."""
+    cols = kinds.shape[1]
+    cells = np.empty((survivors.size, 2), np.int32)
+    boxes = np.empty((survivors.size, 4), np.int32)
+    of_kind = np.empty(survivors.size, kinds.dtype)
+    whole_at = np.empty(survivors.size, np.uint8)
+    row = 0
+    for v in range(survivors.size):
+        while survivors[v] >= (row + 1) * cols:
+            row += 1
+        col = survivors[v] - row * cols
         p = np.int64(power[row >> 1, col >> 1])
         cells[v, 0], cells[v, 1] = row, col
         boxes[v, 0], boxes[v, 1] = row >> p << p, col >> p << p
         boxes[v, 2], boxes[v, 3] = row | (1 << p) - 1, col | (1 << p) - 1
-        of_class[v] = classes[row, col]
+        of_kind[v] = kinds[row, col]
         whole_at[v] = 2 * p
-        v += 1
-    return cells, boxes, of_class, whole_at
+    return cells, boxes, of_kind, whole_at
 
 
 @guarded
 @njit(cache=True, nogil=True)
-def block_darts(classes, power, vertices, new_edge, n_edges):
+def block_darts(kinds, power, vertices, n_edges, words, before):
     """Return the darts of the map of blocks and single cells, counter-clockwise round each.
 
     A corner on the way that is not inside four vertices makes the face of the next dart protected.
+
+    `kinds`, `power`: see `mark_base`; `vertices`: from `block_vertices`; `n_edges`: edges between
+    them; `words`, `before`: `edge_end` of the record in words, and `surviving` of it.
     """
     cells, boxes, _, whole_at = vertices
-    cols = classes.shape[1]
+    rows, cols = kinds.shape
+    flat = kinds.ravel()
     sigma = np.empty(2 * n_edges, np.int32)
     origin = np.empty(2 * n_edges, np.int32)
-    sweep = np.empty(2 * n_edges, np.int32)
+    sweep = np.zeros(2 * n_edges, np.int32)
     protected = np.zeros(2 * n_edges, np.bool_)
-    base_edge = np.empty(n_edges, np.int32)
     for v in range(whole_at.size):
         p = np.int64(whole_at[v] >> 1)
+        row, col = np.int64(cells[v, 0]), np.int64(cells[v, 1])
+        cell = row * cols + col
+        if (
+            (p == 0 and 0 < row < rows - 1 and 0 < col < cols - 1)
+            and (flat[cell + 1] != 0 and flat[cell + cols] != 0)
+            and (flat[cell - 1] != 0 and flat[cell - cols] != 0)
+        ):
+            # As below, for most vertices.
+            east = 2 * number_of(2 * cell, words, before)
+            west = 2 * number_of(2 * (cell - 1), words, before) + 1
+            south = 2 * number_of(2 * (cell - cols) + 1, words, before) + 1
+            north = east + 2
+            sigma[east], sigma[north], sigma[west], sigma[south] = north, west, south, east
+            origin[east] = origin[north] = origin[west] = origin[south] = v
+            protected[east] = flat[cell - cols + 1] == 0
+            protected[north] = flat[cell + cols + 1] == 0
+            protected[west] = flat[cell + cols - 1] == 0
+            protected[south] = flat[cell - cols - 1] == 0
+            continue
         first = -1
         last = -1
         open_corner = False
@@ -179,12 +281,12 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
             out_row, out_col = (0, 1, 0, -1)[direction], (1, 0, -1, 0)[direction]
             step_row, step_col = out_col, -out_row
             # A corner is amid four vertices if the two cells behind and the one across are filled.
-            beside = filled(classes, row - step_row, col - step_col) and filled(
-                classes, row - step_row + out_row, col - step_col + out_col
+            beside = filled(kinds, row - step_row, col - step_col) and filled(
+                kinds, row - step_row + out_row, col - step_col + out_col
             )
             left = 1 << p
             while left > 0:
-                across = filled(classes, row + out_row, col + out_col)
+                across = filled(kinds, row + out_row, col + out_col)
                 open_corner |= not (beside and across)
                 beside = across
                 run = 1
@@ -196,8 +298,7 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
                     low_col = col + min(step_col, 0) * (run - 1)
                     cell = low_row * cols + low_col
                     edge = 2 * min(cell, cell + out_row * cols + out_col) + (direction & 1)
-                    dart = 2 * new_edge[edge] + (direction >> 1)
-                    base_edge[dart >> 1] = edge
+                    dart = 2 * number_of(edge, words, before) + (direction >> 1)
                     origin[dart] = v
                     # From the surviving cell along its column, then along the row.
                     sweep[dart] = cells[v, 1] * (low_row - cells[v, 0])
@@ -216,28 +317,17 @@ def block_darts(classes, power, vertices, new_edge, n_edges):
             sigma[last] = first
             protected[first] |= open_corner
     protect_faces(sigma, protected)
-    return (sigma, origin, sweep), (protected, base_edge)
-
-
-@njit(cache=True, nogil=True, _nrt=False)
-def protect_faces(sigma, protected):
-    """Protect all darts of every face that has a protected dart."""
-    for d in range(sigma.size):
-        if protected[d]:
-            follow = sigma[d ^ 1]
-            while not protected[follow]:
-                protected[follow] = True
-                follow = sigma[follow ^ 1]
+    return sigma, origin, sweep, protected
 
 
 @njit(cache=True, nogil=True)
 def count_sides(origin, base_edge, whole_at):
-    """Count the edges to the east and to the north, int64 (2, 128), by the lesser power of two
+    """Count the edges to the east and to the north, int64 (2, 4), by the lesser power of two
     blocks.
 
     `origin`, `base_edge`: see `Darts`; `whole_at`: see `Vertices`.
     """
-    count = np.zeros((2, 128), np.int64)
+    count = np.zeros((2, _POWERS), np.int64)
     for e in range(base_edge.size):
         least = min(whole_at[origin[2 * e]], whole_at[origin[2 * e + 1]])
         count[base_edge[e] & 1, least >> 1] += 1

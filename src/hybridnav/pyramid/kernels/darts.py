@@ -23,12 +23,15 @@ _BITS = (0, 1, 2, 2, 3, 3, 3, 3)
 
 
 class Darts(NamedTuple):
-    """The darts of one level, indexed by dart but for `base_edge` and `waits`."""
+    """The darts of one level, indexed by dart but for `base_edge` and `waits`.
+
+    Kernels take numbers without a sign: an index with one costs a look whether it is negative.
+    """
 
     sigma: np.ndarray
-    """int32, next dart counter-clockwise round the vertex."""
+    """uint32, next dart counter-clockwise round the vertex."""
     origin: np.ndarray
-    """int32, vertex at which the dart starts."""
+    """uint32, vertex at which the dart starts."""
     sweep: np.ndarray
     """int32, integral of x dy along contracted edges from the surviving cell of the vertex to the
     cell where the dart's base edge starts, modulo 2^32. The area inside a self-loop follows from
@@ -69,17 +72,16 @@ def contract(darts, merged_into, kernel_dart, state, inverse, shift, touched, co
     The darts of a contracted edge are skipped along phi: after dart x of the kernel comes the dart
     after alpha(x). Every dart of the kernel is stepped over once, so the pass is linear.
 
-    `darts`: `Darts` of the level, changed; `merged_into`: int32 (n_vertices,), the vertex of the
+    `darts`: `Darts` of the level, changed; `merged_into`: uint32 (n_vertices,), the vertex of the
     next level that each vertex goes into; `kernel_dart`: int32 (n_vertices,), the dart that starts
     at the parent of v and ends at v, -1 if v survives; `state`: uint8 (n_edges,), receives `ALIVE`
-    or `CONTRACTED`; `inverse`: int32 (n_darts,), receives the inverse of sigma; `shift`: int32
-    (n_vertices,), scratch; `touched`: int32, receives one dart of every ordinary face that lost a
+    or `CONTRACTED`; `inverse`: uint32 (n_darts,), receives the inverse of sigma; `shift`: int32
+    (n_vertices,), scratch; `touched`: uint32, receives one dart of every ordinary face that lost a
     dart: apart from faces with a self-loop, no other face can have become redundant; `cols`:
     columns of the grid.
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
     protected, base_edge = darts.protected, darts.base_edge
-    one = np.uint32(1)
     for e in range(base_edge.size):
         state[e] = ALIVE
     for v in range(kernel_dart.size):
@@ -94,16 +96,16 @@ def contract(darts, merged_into, kernel_dart, state, inverse, shift, touched, co
         if state[e] != ALIVE:
             continue
         for d in (2 * e, 2 * e + 1):
-            following = np.uint32(sigma[d])
-            if state[following >> one] == CONTRACTED:
-                while state[following >> one] == CONTRACTED:
-                    following = np.uint32(sigma[following ^ one])
+            following = sigma[d]
+            if state[following >> 1] == CONTRACTED:
+                while state[following >> 1] == CONTRACTED:
+                    following = sigma[following ^ 1]
                 sigma[d] = following
                 if not protected[d ^ 1]:
                     touched[count] = d ^ 1
                     count += 1
             inverse[following] = d
-            v = np.uint32(origin[d])
+            v = origin[d]
             origin[d] = merged_into[v]
             sweep[d] += shift[v]
         if origin[2 * e] == origin[2 * e + 1]:
@@ -130,13 +132,13 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
     self-loops; nothing but self-loops of one vertex (the one that encloses the others goes).
     """
     crossings = 0
-    last = first = enclosing = np.int32(-1)
-    dart = start
+    last = first = enclosing = np.int64(-1)
+    dart = np.int64(start)
     while True:
         if origin[dart] != origin[dart ^ 1]:
             crossings += 1
             if crossings > 2:
-                return np.int32(-1), np.int32(-1)
+                return np.int64(-1), np.int64(-1)
             first = last
             last = dart
         elif loop_area(dart, sweep, base_edge, cols) < 0:
@@ -149,7 +151,7 @@ def redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols):
         return dart, dart
     if crossings == 2 and first != last ^ 1:
         return max(first, last), min(first, last)
-    return np.int32(-1), np.int32(-1)
+    return np.int64(-1), np.int64(-1)
 
 
 @njit(cache=True, nogil=True, _nrt=False)
@@ -200,7 +202,7 @@ def simplify(darts, touched, any_loop, state, inverse, cols, whole_at, level, al
     for e in range(waits.size):
         if waits[e] == level or (any_loop and origin[2 * e] == origin[2 * e + 1]):
             waits[e] = NO_LEVEL
-            for d in (np.int32(2 * e), np.int32(2 * e + 1)):
+            for d in (np.uint32(2 * e), np.uint32(2 * e + 1)):
                 reduce_face(d, darts, any_loop, state, inverse, cols, whole_at, level)
 
 
@@ -215,17 +217,19 @@ def reduce_face(start, darts, any_loop, state, inverse, cols, whole_at, level):
     protected, base_edge = darts.protected, darts.base_edge
     if state[start >> 1] != ALIVE:
         return
-    while start >= 0 and not protected[start]:
+    while not protected[start]:
         second = sigma[start ^ 1]
-        dart = partner = np.int32(-1)
         if second == start:
-            dart = partner = start
+            dart = partner = np.int64(start)
         elif sigma[second ^ 1] == start and origin[start] != origin[start ^ 1]:
-            if second != start ^ 1:
-                dart, partner = max(start, second), min(start, second)
+            if second == start ^ 1:
+                return
+            dart, partner = np.int64(max(start, second)), np.int64(min(start, second))
         elif any_loop:
             dart, partner = redundant_beside_loops(start, sigma, origin, sweep, base_edge, cols)
-        if dart < 0:
+            if dart < 0:
+                return
+        else:
             return
         first = first_together(dart, partner, darts, whole_at, level, cols)
         if first > level:
@@ -234,10 +238,9 @@ def reduce_face(start, darts, any_loop, state, inverse, cols, whole_at, level):
         other = dart ^ 1
         # A dart that stays in the merged face: from this side, else from the other.
         start = sigma[other]
+        is_last = start == dart and sigma[dart] == other
         if start == dart:
             start = sigma[dart]
-            if start == other:
-                start = np.int32(-1)
         if protected[other]:
             follow = sigma[other]
             while follow != dart:
@@ -246,6 +249,8 @@ def reduce_face(start, darts, any_loop, state, inverse, cols, whole_at, level):
         unlink(dart, sigma, inverse)
         unlink(other, sigma, inverse)
         state[dart >> 1] = REMOVED
+        if is_last:
+            return
 
 
 @njit(cache=True, nogil=True, _nrt=False)
@@ -257,7 +262,6 @@ def compact_darts(darts, state, new_edge, level, edge_end):
     """
     sigma, origin, sweep = darts.sigma, darts.origin, darts.sweep
     protected, base_edge, waits = darts.protected, darts.base_edge, darts.waits
-    one = np.uint32(1)
     n_edges = 0
     for e in range(base_edge.size):
         if state[e] == ALIVE:
@@ -272,12 +276,23 @@ def compact_darts(darts, state, new_edge, level, edge_end):
         base_edge[f >> 1], waits[f >> 1] = base_edge[e], waits[e]
         for half in range(2):
             d = 2 * e + half
-            following = np.uint32(sigma[d])
-            sigma[f + half] = new_edge[following >> one] + np.int32(following & one)
+            following = sigma[d]
+            sigma[f + half] = new_edge[following >> 1] + (following & 1)
             origin[f + half] = origin[d]
             sweep[f + half] = sweep[d]
             protected[f + half] = protected[d]
     return n_edges
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def protect_faces(sigma, protected):
+    """Protect all darts of every face that has a protected dart."""
+    for d in range(sigma.size):
+        if protected[d]:
+            follow = sigma[d ^ 1]
+            while not protected[follow]:
+                protected[follow] = True
+                follow = sigma[follow ^ 1]
 
 
 # Kernels on the base of a level: walks round its vertices and faces by the ends of edges.

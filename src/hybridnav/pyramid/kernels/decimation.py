@@ -126,11 +126,11 @@ def contractible(
     merged fields first keeps fields compact (measured 2 to 5 % fewer places on real maps than the
     distance between the surviving cells or the merged radius).
 
-    `origin`, `base_edge`: int32 (2 n_edges,) and (n_edges,), as in `Darts`; `vertices`, `hulls`:
-    `Vertices` and `Hulls` of the level; `level`: number of the level; `linkage`, `limit`: see
-    `possible_survivors`; `order`: `Order`, of equal attributes; `keys`: uint64 (n_edges,), filled
-    in; `survivors_of_edge`: uint8 (n_edges,), receives which end of an edge may survive; `best`:
-    uint64 (n_vertices,), receives the least key of each vertex.
+    `origin`, `base_edge`: see `Darts`; `vertices`, `hulls`: `Vertices` and `Hulls` of the level;
+    `level`: number of the level; `linkage`, `limit`: see `possible_survivors`; `order`: `Order`, of
+    equal attributes; `keys`: uint64 (n_edges,), filled in; `survivors_of_edge`: uint8 (n_edges,),
+    receives which end of an edge may survive; `best`: uint64 (n_vertices,), receives the least key
+    of each vertex.
     """
     cells, boxes, classes, whole_at = vertices
     hull_start, hull_points = hulls
@@ -141,8 +141,8 @@ def contractible(
     # diameter already need hulls.
     spread = 4 if linkage == DIAMETER and hull_start.size == 0 else 1
     for e in range(base_edge.size):
-        u = np.uint32(origin[2 * e])
-        v = np.uint32(origin[2 * e + 1])
+        u = origin[2 * e]
+        v = origin[2 * e + 1]
         if u == v or classes[u] != classes[v] or max(whole_at[u], whole_at[v]) > level:
             continue
         height = np.int64(max(boxes[u, 2], boxes[v, 2]) - min(boxes[u, 0], boxes[v, 0]))
@@ -169,11 +169,10 @@ def contractible(
 def open_candidates(origin, base_edge, arcs, ranks, order, keys, survivors_of_edge, best):
     """Fill `keys` with the keys of some arcs by their ranks; let either endpoint of each survive.
 
-    `origin`, `base_edge`: int32 (2 n_edges,) and (n_edges,), as in `Darts`; `arcs`, `ranks`: int64
-    (n,), edges that may be contracted, and their attributes, at most `ATTRIBUTE_MAX`: the least
-    first; `order`: `Order`, of equal ranks; `keys`: uint64 (n,), filled in; `survivors_of_edge`:
-    uint8 (n_edges,), receives that either endpoint of these arcs may survive; `best`: uint64
-    (n_vertices,), receives the least key of each vertex.
+    `origin`, `base_edge`: see `Darts`; `arcs`, `ranks`: int64 (n,), edges that may be contracted,
+    and their attributes, at most `ATTRIBUTE_MAX`: the least first; `order`: `Order`, of equal
+    ranks; `keys`: uint64 (n,), filled in; `survivors_of_edge`: uint8 (n_edges,), receives that
+    either endpoint of these arcs may survive; `best`: as from `contractible`.
     """
     for v in range(best.size):
         best[v] = _NO_KEY
@@ -183,7 +182,7 @@ def open_candidates(origin, base_edge, arcs, ranks, order, keys, survivors_of_ed
         keys[i] = key
         survivors_of_edge[edge] = EITHER_MAY_SURVIVE
         for dart in (2 * edge, 2 * edge + 1):
-            end = np.uint32(origin[dart])
+            end = origin[dart]
             best[end] = min(best[end], key)
 
 
@@ -202,16 +201,16 @@ def match(origin, keys, best, matched, rest):
         for i in range(count):
             key = active[i]
             dart = (key & _POSITION) << np.uint64(1)
-            u = np.uint32(origin[dart])
-            v = np.uint32(origin[dart + np.uint64(1)])
+            u = origin[dart]
+            v = origin[dart + np.uint64(1)]
             if best[u] == key and best[v] == key:
                 matched[u] = matched[v] = np.int32(key & _POSITION)
         kept = 0
         for i in range(count):
             key = active[i]
             dart = (key & _POSITION) << np.uint64(1)
-            u = np.uint32(origin[dart])
-            v = np.uint32(origin[dart + np.uint64(1)])
+            u = origin[dart]
+            v = origin[dart + np.uint64(1)]
             if matched[u] < 0 and matched[v] < 0:
                 best[u] = best[v] = _NO_KEY
                 rest[kept] = key
@@ -221,8 +220,8 @@ def match(origin, keys, best, matched, rest):
         for i in range(count):
             key = active[i]
             dart = (key & _POSITION) << np.uint64(1)
-            u = np.uint32(origin[dart])
-            v = np.uint32(origin[dart + np.uint64(1)])
+            u = origin[dart]
+            v = origin[dart + np.uint64(1)]
             best[u] = min(best[u], key)
             best[v] = min(best[v], key)
 
@@ -241,8 +240,8 @@ def join_leaves(origin, keys, survivors_of_edge, matched, best, parent, kernel_d
         key = keys[i]
         edge = key & _POSITION
         dart = edge << np.uint64(1)
-        u = np.uint32(origin[dart])
-        v = np.uint32(origin[dart + np.uint64(1)])
+        u = origin[dart]
+        v = origin[dart + np.uint64(1)]
         if matched[v] >= 0 and matched[u] >= 0:
             continue
         if matched[v] < 0 and survivors_of_edge[edge] & FIRST_MAY_SURVIVE and key < best[v]:
@@ -305,12 +304,12 @@ def select_stars(
     join_leaves(darts_origin, keys, survivors_of_edge, matched, best, parent, kernel_dart)
     for v in range(matched.size):
         if parent[v] != v:
-            has_leaf[np.uint32(parent[v])] = True
+            has_leaf[parent[v]] = True
     for end in range(matched.size):
         if matched[end] < 0:
             continue
         edge = np.uint32(matched[end])
-        u, v = np.uint32(darts_origin[2 * edge]), np.uint32(darts_origin[2 * edge + 1])
+        u, v = darts_origin[2 * edge], darts_origin[2 * edge + 1]
         if u != end:
             continue
         survivors = survivors_of_edge[edge]
@@ -340,7 +339,7 @@ def select_stars(
 def compact_vertices(vertices, parent, merged_into, cols, level, vertex_end, vertex_parent):
     """Merge boxes into survivors and close the gaps, in place; return the number of survivors.
 
-    `vertices`: `Vertices` of the level, changed; `parent`, `merged_into`: int32 (n_vertices,), the
+    `vertices`: `Vertices` of the level, changed; `parent`, `merged_into`: uint32 (n_vertices,), the
     second receives the vertex of the next level that each one goes into; `cols`: columns of the
     grid; `level`: number of the level; `vertex_end`, `vertex_parent`: by flat cell: receive the
     level at which a surviving cell goes, and the cell it goes into.

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import find
-from hybridnav.pyramid.kernels.darts import base_sigma, next_at_cell
+from hybridnav.pyramid.kernels.darts import base_sigma, next_at_cell, protect_faces
 
 
 @guarded
@@ -94,37 +94,10 @@ def place_of(edges, edge):
     return low
 
 
-@guarded
 @njit(cache=True, nogil=True)
-def find_cracks(field_of, rows, cols):
-    """Return the base edges between cells of different fields, ascending, and the class of each.
-
-    Two cracks belong to one class when they lie in the same full 2x2 block that holds exactly two
-    cracks; the class is the position of one of its cracks.
-    """
-    count = 0
-
-    # The first pass counts and the second one writes, so the array has exactly the size needed.
-    for pass_ in range(2):
-        if pass_ == 1:
-            cracks = np.empty(count, np.int64)
-            count = 0
-        for cell in range(rows * cols):
-            if field_of[cell] < 0:
-                continue
-            if (cell + 1) % cols != 0:
-                other = field_of[cell + 1]
-                if other >= 0 and other != field_of[cell]:
-                    if pass_ == 1:
-                        cracks[count] = 2 * cell
-                    count += 1
-            if cell + cols < rows * cols:
-                other = field_of[cell + cols]
-                if other >= 0 and other != field_of[cell]:
-                    if pass_ == 1:
-                        cracks[count] = 2 * cell + 1
-                    count += 1
-
+def crack_classes(cracks, field_of, rows, cols):
+    """Return the class of each base edge between cells of different fields; see `find_cracks`."""
+    count = cracks.size
     # Only two fields meet in a block with two cracks, and their border runs on through it: the
     # cracks of one stretch of border become one class.
     root = np.empty(count, np.int64)
@@ -155,7 +128,7 @@ def find_cracks(field_of, rows, cols):
                 root[max(a, b)] = min(a, b)
     for i in range(count):
         root[i] = find(root, i)
-    return cracks, root
+    return root
 
 
 @njit(cache=True, nogil=True)
@@ -225,11 +198,7 @@ def level_darts(edges, edge_end, vertex_end, field_of, level, rows, cols):
             sigma[2 * e + half] = 2 * place_of(edges, dart >> 1) + (dart & 1)
             if is_protected:
                 protected[2 * e + (1 - half)] = True
-    for d in range(2 * n_edges):
-        follow = sigma[d ^ 1]
-        while protected[d] and not protected[follow]:
-            protected[follow] = True
-            follow = sigma[follow ^ 1]
+    protect_faces(sigma, protected)
     return sigma, origin, protected
 
 
@@ -307,10 +276,7 @@ def edges_to_rim(start, inside, field_of, edge_end, level, cols, came):
         ):
             break
         if size + 4 > queue.size:
-            wider = np.empty(2 * queue.size, np.int64)
-            for i in range(size):
-                wider[i] = queue[i]
-            queue = wider
+            queue = np.concatenate((queue, queue))
         for k in range(4):
             edge, beyond = edge_and_face_beyond(corner, k, cols)
             end = edge_end[edge]

@@ -45,11 +45,12 @@ def field_hulls(field_of, cols, boxes):
 
 @guarded
 @njit(cache=True, nogil=True)
-def block_hulls(blocks, field_of, boxes):
-    """Return the convex hulls of connected fields that are made of blocks.
+def block_rows(blocks, field_of, boxes):
+    """Return the rows of connected fields that are made of blocks.
 
     `blocks`: int32 (n_blocks, 4), `field_of`: int32 (n_blocks,), the box of each block and its
-    field; `boxes`: int32 (n_vertices, 4), of the fields.
+    field; `boxes`: int32 (n_vertices, 4), of the fields. Returns where the rows of each field
+    begin, (n_vertices + 1,); blocks of one row, from its first cell to the last one; their fields.
     """
     first_row, left, right = rows_of(boxes)
     for i in range(field_of.size):
@@ -58,7 +59,12 @@ def block_hulls(blocks, field_of, boxes):
             at = first_row[v] + row - boxes[v, 0]
             left[at] = min(left[at], blocks[i, 1])
             right[at] = max(right[at], blocks[i, 3])
-    return hulls_of_rows(boxes, first_row, left, right)
+    rows, of_row = np.empty((left.size, 4), np.int32), np.empty(left.size, np.int32)
+    for v in range(boxes.shape[0]):
+        for i in range(first_row[v], first_row[v + 1]):
+            rows[i, 0] = rows[i, 2] = boxes[v, 0] + i - first_row[v]
+            rows[i, 1], rows[i, 3], of_row[i] = left[i], right[i], v
+    return first_row, rows, of_row
 
 
 @guarded
@@ -91,67 +97,6 @@ def hulls_of_rows(boxes, first_row, left, right):
         end = chain(rows, right[low:high], high - low, 1, points, end)
         start[v + 1] = end
     return start, points[:end].copy()
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def merged_hulls(start, points, merged_into, n_vertices):
-    """Return the convex hulls of fields from those of their parts.
-
-    `start`, `points`: see `decimation.Hulls`; `merged_into`: int32 (n_parts,), the field that each
-    part belongs to; `n_vertices`: number of fields.
-    """
-    first_part = np.full(n_vertices, np.int32(-1), np.int32)
-    behind = np.empty(merged_into.size, np.int32)
-    for part in range(merged_into.size):
-        behind[part] = first_part[merged_into[part]]
-        first_part[merged_into[part]] = part
-    new_start = np.zeros(n_vertices + 1, np.int64)
-    hulls = np.empty_like(points)
-    rows, cols = np.empty(points.shape[0], np.int32), np.empty(points.shape[0], np.int32)
-    end = 0
-    for v in range(n_vertices):
-        part = first_part[v]
-        if behind[part] < 0:
-            for i in range(start[part], start[part + 1]):
-                hulls[end, 0], hulls[end, 1] = points[i, 0], points[i, 1]
-                end += 1
-        else:
-            for hand in (-1, 1):
-                count = 0
-                part = first_part[v]
-                while part >= 0:
-                    count = add_chain(start, points, part, hand, rows, cols, count)
-                    part = behind[part]
-                end = chain(rows, cols, count, hand, hulls, end)
-        new_start[v + 1] = end
-    return new_start, hulls[:end].copy()
-
-
-@njit(cache=True, nogil=True, _nrt=False)
-def add_chain(start, points, part, hand, rows, cols, count):
-    """Add one half of a hull to points sorted by row, of which the outermost of each row stays.
-
-    `start`, `points`, `part`: the points of each hull, and which one; `hand`: 1 for the right half,
-    -1 for the left; `rows`, `cols`, `count`: the points so far, filled in, and their number.
-    """
-    low, high = start[part], start[part + 1]
-    right = low + 1  # where the rows of the right half begin anew
-    while points[right, 0] > points[right - 1, 0]:
-        right += 1
-    for i in range(right if hand > 0 else low, high if hand > 0 else right):
-        row, col = points[i, 0], points[i, 1]
-        at = count
-        while at > 0 and rows[at - 1] > row:
-            at -= 1
-        if at > 0 and rows[at - 1] == row:
-            cols[at - 1] = max(cols[at - 1], col) if hand > 0 else min(cols[at - 1], col)
-            continue
-        for k in range(count, at, -1):
-            rows[k], cols[k] = rows[k - 1], cols[k - 1]
-        rows[at], cols[at] = row, col
-        count += 1
-    return count
 
 
 @njit(cache=True, nogil=True)

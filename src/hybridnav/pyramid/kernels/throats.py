@@ -24,31 +24,50 @@ def clearances(classes, most):
     away = np.full((rows + 4, cols + 4), np.uint16(most), np.uint16)
     for row in range(rows):
         for col in range(cols):
-            if classes[row, col] != 1:
-                away[row + 2, col + 2] = 0
+            away[row + 2, col + 2] = most if classes[row, col] == 1 else 0
     squares = np.zeros((rows + 1 >> 1, cols + 1 >> 1), np.uint16)
     for row in range(2, rows + 2):
-        for col in range(2, cols + 2):
-            if away[row, col] > 0:
-                least = min(np.int64(most), away[row, col - 1] + STRAIGHT)
-                least = min(least, away[row - 1, col] + STRAIGHT)
-                diagonal = min(away[row - 1, col - 1], away[row - 1, col + 1])
-                knight = min(away[row - 2, col - 1], away[row - 2, col + 1])
-                knight = min(knight, away[row - 1, col - 2], away[row - 1, col + 2])
-                away[row, col] = min(least, diagonal + DIAGONAL, knight + KNIGHT)
+        step_across(away[row, 2:-2], away[row - 1], away[row - 2])
+        step_along(away[row, 2:-2], most)
     for row in range(rows + 1, 1, -1):
-        for col in range(cols + 1, 1, -1):
-            if away[row, col] > 0:
-                least = min(np.int64(away[row, col]), away[row, col + 1] + STRAIGHT)
-                least = min(least, away[row + 1, col] + STRAIGHT)
-                diagonal = min(away[row + 1, col - 1], away[row + 1, col + 1])
-                knight = min(away[row + 2, col - 1], away[row + 2, col + 1])
-                knight = min(knight, away[row + 1, col - 2], away[row + 1, col + 2])
-                least = min(least, diagonal + DIAGONAL, knight + KNIGHT)
-                away[row, col] = least
-                square = (row >> 1) - 1, (col >> 1) - 1
-                squares[square] = max(squares[square], least)
+        step_across(away[row, 2:-2], away[row + 1], away[row + 2])
+        step_along(away[row, -3:1:-1], most)
+        of_row = squares[(row >> 1) - 1]
+        for i in range(cols >> 1):
+            of_row[i] = max(of_row[i], away[row, 2 * i + 2], away[row, 2 * i + 3])
+        if cols & 1:
+            of_row[cols >> 1] = max(of_row[cols >> 1], away[row, cols + 1])
     return squares
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def step_across(away, one, two):
+    """Shorten the distances of a row by the steps to the row beside it and the one after that.
+
+    The rows begin two cells before it. There is no branch: many cells are one instruction.
+    """
+    n = away.size
+    far_west, west, beside = one[:n], one[1 : n + 1], one[2 : n + 2]
+    east, far_east, two_west, two_east = (
+        one[3 : n + 3],
+        one[4 : n + 4],
+        two[1 : n + 1],
+        two[3 : n + 3],
+    )
+    for col in range(n):
+        diagonal = np.uint16(min(west[col], east[col]) + np.uint16(DIAGONAL))
+        knight = min(two_west[col], two_east[col], far_west[col], far_east[col])
+        least = min(np.uint16(beside[col] + np.uint16(STRAIGHT)), diagonal)
+        away[col] = min(away[col], least, np.uint16(knight + np.uint16(KNIGHT)))
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def step_along(away, most):
+    """Shorten the distances of a row by steps from each cell to the next one."""
+    near = np.uint16(most)
+    for col in range(away.size):
+        near = min(away[col], np.uint16(near + np.uint16(STRAIGHT))) if away[col] > 0 else away[col]
+        away[col] = near
 
 
 @njit(cache=True, nogil=True)
@@ -56,8 +75,8 @@ def in_order(away, most):
     """Return the flat cells with a clearance, the least first, and where each clearance begins."""
     begin = np.zeros(most + 2, np.int64)
     for k in away:
-        begin[k + 1] += 1
-    begin[1] = 0
+        if k > 0:
+            begin[k + 1] += 1
     for k in range(1, most + 1):
         begin[k + 1] += begin[k]
     order = np.empty(begin[most + 1], np.int32)
