@@ -18,9 +18,9 @@ _CLASSES = hn.CellClass.FREE, hn.CellClass.OCCUPIED
 
 
 def is_rest(new: Any, old: Any) -> bool:
-    """Whether a line is one of the last points of another, behind its start."""
+    """Whether a line is one of the last points of another, or all, behind its start."""
     n = len(new) - 1
-    return n < len(old) and np.array_equal(new[1:], old[len(old) - n :])
+    return n <= len(old) and np.array_equal(new[1:], old[len(old) - n :])
 
 
 @given(class_grids(max_side=24), seeds, st.sampled_from([0.0, 0.02, 0.5]))

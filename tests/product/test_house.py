@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_510,
-    "lines": 103_085,
+    "code": 65_497,
+    "lines": 103_090,
     "files": 438,
-    "code outside ext": 50_450,
+    "code outside ext": 50_440,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -31,7 +31,7 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 72_290,
+    "lines of tests": 72_306,
 }
 
 BUDGETS = {
@@ -51,7 +51,7 @@ BUDGETS = {
     "pyramid": (4300, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
-    "rooms": (5536, 8),
+    "rooms": (5555, 8),
     "route": (1031, 6),
     "search": (12560, 9),
     "topology": (699, 6),

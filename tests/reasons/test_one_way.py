@@ -120,7 +120,10 @@ def _is_true(proof, free):
     plane = OneWayPlane(free, np.array([*_sides_of(proof["one_way"])], np.int32).reshape(-1, 4))
     points = [(Fraction(y), Fraction(x)) for x, y in (proof["start"], proof["goal"])]
     ends = [((math.floor(y), math.floor(x)), (y, x)) for y, x in points]
-    if proof["kind"] == "line":
+    (rows, cols), cells = free.shape, [cell for cell, _ in ends]
+    if not all(0 <= row < rows and 0 <= col < cols for row, col in cells):
+        best = math.inf  # in a cell beyond the rim
+    elif proof["kind"] == "line":
         best = float(plane.lengths(ends[:1], ends[1:])[0, 0])
     else:
         best = plane.cells_length(ends[0][0], ends[1][0])

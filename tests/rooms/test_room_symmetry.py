@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
+from hybridnav.rooms.cutting import Kind, without_noise
 from research._rooms_buildings import SITES, Building
 from tests.graphs.test_lane_symmetry import WAYS, offices, turned
 from tests.strategies import class_grids, examples, occupancy_grid
@@ -66,6 +67,16 @@ def test_rooms_outlive_noise():
         for mine in (one == label for label in range(len(rooms.names)))
     ]
     assert sorted(shares)[1] >= 0.8
+
+
+def test_pillars_are_no_noise():
+    free = np.ones((12, 40), np.uint8)
+    free[6, 4::8] = 0
+    kinds = np.where(free, np.uint8(Kind.INSIDE), np.uint8(Kind.WALL))
+    many = np.tile(kinds, (4, 4))
+    for cells, side in ((kinds, 0.05), (many, 0.5)):  # few; wide
+        assert np.array_equal(without_noise(cells, side), cells)
+    assert (without_noise(many, 0.05) == Kind.INSIDE).all()
 
 
 @pytest.mark.parametrize("name", SITES)

@@ -14,9 +14,10 @@ from hybridnav.maps.clearance import clearance_cells, closing, within_radius
 from hybridnav.rooms.kernels import cutting as _cell_kernels
 
 _ROUNDING = 1e-9
-_ALONE, _NOISE = 7, 0.003
+_ALONE, _NOISE, _MANY, _WIDEST_M = 7, 0.003, 30, 0.1
 """Free cells of the eight round an occupied one from which on it is alone; how many such there are
-for each free cell in a map of noise. Of 43 real maps none has more than 0.0026: legs of chairs."""
+in a map of noise, for each free cell and in all, and how wide they are: pillars are no noise. No
+real map of 43 has more than 0.0026 for each: legs of chairs."""
 _CLOSE_M = 0.15
 _CLOSE_RAYS_M = 0.25
 _HOLE_M2 = 0.5
@@ -84,19 +85,12 @@ class Ground:
     def of(cls, kinds: ByteArray, resolution_m: float) -> Ground:
         """Return the ground of some cells.
 
-        Where many occupied cells stand alone, they are noise and count as free. On a scan of single
-        rays, so do the unexplored cells between them, and what is unexplored beyond is wall.
+        On a scan of single rays, the unexplored cells between them count as free, and what is
+        unexplored beyond as wall.
 
         `kinds`: uint8 (rows, cols), see `Kind`; `resolution_m`: side of a cell in metres.
         """
         occupied, free = kinds == Kind.WALL, kinds == Kind.INSIDE
-        beside = np.pad(free, 1).view(np.uint8)
-        beside = beside[:-2] + beside[1:-1] + beside[2:]
-        alone = occupied & (beside[:, :-2] + beside[:, 1:-1] + beside[:, 2:] >= _ALONE)
-        if np.count_nonzero(alone) > _NOISE * np.count_nonzero(free):
-            free |= alone
-            occupied &= ~alone
-        del beside, alone
         closed = closed_by_disc(free, occupied, _CLOSE_M / resolution_m)
         rim = _rim(closed)
         n_unexplored = np.count_nonzero(rim & (kinds == Kind.UNKNOWN))
@@ -115,6 +109,23 @@ class Ground:
         depths = np.sqrt(np.arange((_RIM_M / resolution_m + 1) ** 2))
         depth = depths[depths * resolution_m <= _RIM_M].max()
         return cls(free, occupied & within_radius(free, radius_cells=depth), squares, resolution_m)
+
+
+def without_noise(kinds: ByteArray, resolution_m: float) -> ByteArray:
+    """Return cells with the occupied ones free that are noise: small, many, and alone among free
+    ones.
+
+    `kinds`: uint8 (rows, cols), see `Kind`; `resolution_m`: side of a cell in metres.
+    """
+    if resolution_m > _WIDEST_M:
+        return kinds
+    free = np.pad(kinds == Kind.INSIDE, 1).view(np.uint8)
+    beside = free[:-2] + free[1:-1] + free[2:]
+    beside = beside[:, :-2] + beside[:, 1:-1] + beside[:, 2:]
+    alone = (kinds == Kind.WALL) & (beside >= _ALONE)
+    if np.count_nonzero(alone) <= max(_MANY, _NOISE * np.count_nonzero(free)):
+        return kinds
+    return np.where(alone, np.uint8(Kind.INSIDE), kinds)
 
 
 def fine_segments(ground: Ground) -> IntArray:

@@ -16,7 +16,14 @@ from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_mask
 from hybridnav.maps.orientation import Orientation
 from hybridnav.maps.room_labels import MAX_ROOMS
-from hybridnav.rooms.cutting import Ground, Kind, fine_segments, least_cells, spread
+from hybridnav.rooms.cutting import (
+    Ground,
+    Kind,
+    fine_segments,
+    least_cells,
+    spread,
+    without_noise,
+)
 from hybridnav.rooms.kernels import cutting as _cell_kernels
 from hybridnav.rooms.merging import (
     Forest,
@@ -133,6 +140,7 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     known = np.s_[top:bottom, left:right]
     margin = int(WALL_REACH_M / grid.resolution_m) + 1
     kinds = np.pad(KINDS[grid.measured[known]] + free[known], margin)
+    kinds = without_noise(kinds, grid.resolution_m)
     image = Orientation.of(kinds)
     image = replace(image, swaps=1 - image.swaps, flips=image.flips[::-1])  # longer along columns
     segments = _segments(image.turned(kinds), grid.resolution_m)

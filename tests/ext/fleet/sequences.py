@@ -144,7 +144,7 @@ class Sequence:
         lost = {
             f"one-way line {number} of the rooms"
             for number, line in enumerate(self.lines[index], start=1)
-            if is_lost(line, free)
+            if is_lost(line, free) and line not in self.lines[index][: number - 1]  # said once
         }
         if told != lost:
             yield f"reported {told}, lost are {lost}"

@@ -53,7 +53,7 @@ def test_contacts_are_what_shapely_finds_outside_the_free_squares(scene, allow_u
     assert (outside > 1e-9) <= bool(found)
     if not is_free.any():
         return
-    fine = shapely.get_coordinates(shapely.segmentize(line, 0.01)) if len(points) > 1 else points
+    fine = shapely.get_coordinates(shapely.segmentize(line, 0.01)) if line.length > 0 else points
     depth = max(shapely.distance(shapely.points(fine), free))
     assert abs(max((each.depth_m for each in found), default=0.0) - depth) < WITHIN + 0.01
     for each in found:

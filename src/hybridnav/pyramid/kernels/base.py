@@ -85,9 +85,9 @@ def mark_base(kinds, power, by_row, by_col, vertex_end, vertex_parent, edge_end)
     """Fill the record for the blocks alone.
 
     Cells, and edges inside a block, go with halves of the quadtree: two columns, 2^j apart, merge
-    at level 2j + 1, two rows at level 2j + 2. Of parallel edges to the east the one at the lowest
-    row stays, the others go as their rows merge; to the north likewise by columns. There is no
-    branch, so that many cells of a row are one instruction.
+    at level 2j + 1, two rows at level 2j + 2. The lowest one of parallel edges to the east stays,
+    the others go as their rows merge; to the north likewise by columns. There is no branch,
+    so that many cells of a row are one instruction.
 
     `kinds`: (rows, cols), the kinds of cells, 0 for none; `power`: see `start.block_powers`;
     `by_row`, `by_col`: `Merging` of the rows and columns; `vertex_end`, `vertex_parent`,
