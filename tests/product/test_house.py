@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_497,
-    "lines": 103_090,
+    "code": 65_499,
+    "lines": 103_092,
     "files": 438,
-    "code outside ext": 50_440,
+    "code outside ext": 50_442,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -48,7 +48,7 @@ BUDGETS = {
     "maps": (5304, 6),
     "models": (2113, 6),
     "planning": (6856, 9),
-    "pyramid": (4300, 9),
+    "pyramid": (4302, 9),
     "reasons": (1179, 6),
     "refine": (6145, 9),
     "rooms": (5555, 8),

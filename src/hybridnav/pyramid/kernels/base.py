@@ -15,7 +15,6 @@ _SURVIVES = 255
 _POWERS = 4
 """Powers of blocks, 0 for single cells."""
 _HIGH = np.uint64(0x8080808080808080)
-_LOW = np.uint64(0x0101010101010101)
 
 
 @njit(cache=True, nogil=True)
@@ -194,7 +193,10 @@ def surviving(words):
 @njit(cache=True, nogil=True, _nrt=False)
 def count_high(word):
     """Return the number of bytes of a word that are 128 or more."""
-    return np.int64(((word & _HIGH) >> np.uint64(7)) * _LOW >> np.uint64(56))
+    ones = (word & _HIGH) >> np.uint64(7)  # added up without a product, which numpy warns of
+    ones += ones >> np.uint64(32)
+    ones += ones >> np.uint64(16)
+    return np.int64((ones + (ones >> np.uint64(8))) & np.uint64(15))
 
 
 @njit(cache=True, nogil=True, _nrt=False)
