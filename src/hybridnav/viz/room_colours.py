@@ -29,14 +29,12 @@ def colour_rooms(labels: RoomLabels, grid: OccupancyGrid, *others: RoomLabels) -
     number_of = {name: number for number, name in enumerate(names)}
     graph = nx.empty_graph(len(names))
     # Ties hang on the order of the edges, which must not hang on that of the maps.
-    rank_of = {name: k for k, name in enumerate(sorted(names, key=lambda name: (len(name), name)))}
-    edges: set[tuple[int, int]] = set()
-    for each in maps:
-        ranks = np.array([rank_of[name] for name in each.names], np.int64)
-        pairs = ranks[neighbours(each.label_of, grid.resolution_m)]
-        edges.update(map(tuple, np.sort(pairs, axis=1).tolist()))
-    ordered = list(rank_of)
-    graph.add_edges_from([number_of[ordered[at]] for at in pair] for pair in sorted(edges))
+    edges = {
+        tuple(sorted((len(each.names[at]), each.names[at]) for at in pair))
+        for each in maps
+        for pair in neighbours(each.label_of, grid.resolution_m).tolist()
+    }
+    graph.add_edges_from([number_of[name] for _, name in pair] for pair in sorted(edges))
     colour_of: dict[int, int] = {}
     n_used = [0] * N_COLOURS
     for room in nx.coloring.strategy_smallest_last(graph, colour_of):
