@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_499,
-    "lines": 103_092,
+    "code": 65_476,
+    "lines": 103_069,
     "files": 438,
-    "code outside ext": 50_442,
+    "code outside ext": 50_419,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -35,7 +35,7 @@ LIMITS = {
 }
 
 BUDGETS = {
-    "_base": (2887, 6),
+    "_base": (2900, 6),
     "cli": (3818, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),
@@ -43,19 +43,19 @@ BUDGETS = {
     "ext/live": (7653, 8),
     "ext/page": (3229, 7),
     "graphs": (6570, 6),
-    "guide": (3594, 10),
+    "guide": (3589, 10),
     "harness": (9443, 8),
     "maps": (5304, 6),
     "models": (2113, 6),
     "planning": (6856, 9),
-    "pyramid": (4302, 9),
-    "reasons": (1179, 6),
+    "pyramid": (4296, 9),
+    "reasons": (1176, 6),
     "refine": (6145, 9),
-    "rooms": (5555, 8),
+    "rooms": (5539, 8),
     "route": (1031, 6),
     "search": (12560, 9),
-    "topology": (699, 6),
-    "viz": (5405, 6),
+    "topology": (694, 6),
+    "viz": (5309, 6),
 }
 """Lines of each package at most, and floors in it: 6 are wanted, where there are more none is
 added."""

@@ -1,4 +1,4 @@
-"""Distinct rows of an array, and numbers in runs."""
+"""Distinct rows of an array, what pairs of numbers join, and numbers in runs."""
 
 from __future__ import annotations
 
@@ -40,6 +40,19 @@ def unique_rows(rows: AnyArray) -> UniqueRows:
     number_of[order] = np.cumsum(is_new) - 1
     n_times = np.diff(begin, append=len(rows))
     return UniqueRows(ordered[begin], order[begin], number_of, n_times)
+
+
+def connected_parts(pairs: AnyArray, count: int) -> LongArray:
+    """Return the connected part of each of some things, int64 (count,), numbered from 0.
+
+    `pairs`: whole numbers (n, 2), which of them are joined; `count`: how many there are.
+    """
+    # Loads scipy, which most callers of this module can do without.
+    from scipy.sparse import coo_array  # noqa: PLC0415
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    graph = coo_array((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def in_runs(start: LongArray, length: LongArray) -> LongArray:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
+from hybridnav._base.rows import connected_parts
 from hybridnav._base.typing import BoolArray, LongArray
 from hybridnav.guide.tour import Tour, tour_of
 from hybridnav.guide.words.bends import Leg
@@ -294,13 +295,7 @@ class DoorTours:
 
     def _parts(self, is_outside: BoolArray) -> LongArray:
         """Return the connected part of each vertex of the room level, joined by some arcs."""
-        from scipy.sparse import coo_array  # noqa: PLC0415 - on demand
-        from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-
-        tails, heads = self._graph.endpoints[is_outside].T
-        count = self._rooms.level.n_vertices
-        joined = coo_array((np.ones(len(tails), dtype=np.int8), (tails, heads)), (count, count))
-        return connected_components(joined, directed=False)[1].astype(np.int64)
+        return connected_parts(self._graph.endpoints[is_outside], self._rooms.level.n_vertices)
 
 
 def admissible(

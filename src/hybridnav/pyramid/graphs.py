@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridnav._base.copies import copies_alike
-from hybridnav._base.rows import unique_rows
+from hybridnav._base.rows import connected_parts, unique_rows
 from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass, OccupancyGrid
 
@@ -59,14 +59,8 @@ class CombinatorialMap:
 
     def faces(self) -> LongArray:
         """Label the faces: for each dart the number of its orbit under phi, dense from 0."""
-        from scipy.sparse import coo_array  # noqa: PLC0415 - only who looks at the dual pays
-        from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-
-        n_darts = len(self.sigma)
-        ones = np.ones(n_darts, dtype=np.int8)
-        steps = coo_array((ones, (np.arange(n_darts), self.phi)), shape=(n_darts, n_darts))
-        _, label = connected_components(steps, directed=False)
-        return label.astype(np.int64)
+        steps = np.stack([np.arange(len(self.sigma)), self.phi], axis=1)
+        return connected_parts(steps, len(steps))
 
 
 class FaceKind(IntEnum):

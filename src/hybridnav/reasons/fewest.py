@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hybridnav._base.rows import unique_rows
+from hybridnav._base.rows import connected_parts, unique_rows
 from hybridnav._base.typing import BoolArray, LongArray
 
 Name = TypeVar("Name")
@@ -72,7 +72,7 @@ class _Regions:
     """The closures of several passages; none if they are many."""
 
     def __init__(self, ground: OpenGround, closures: list[LongArray]) -> None:
-        from scipy import ndimage, sparse  # noqa: PLC0415 - half a second that plans do not need
+        from scipy import ndimage  # noqa: PLC0415 - half a second that plans do not need
 
         shape, free = ground.enterable.shape, ground.enterable.ravel()
         # Cells that are closed or beside a closed move are looked at one by one, others as sets.
@@ -97,9 +97,7 @@ class _Regions:
         barred = np.concatenate([barred, np.zeros(len(outer), np.int64)])
         keys = np.concatenate([np.zeros(n_sets, np.int64), key])
         is_open = (barred == 0) & (keys[moves[:, 0]] == keys[moves[:, 1]])
-        ones = np.ones(int(is_open.sum()), np.int8)
-        graph = sparse.coo_array((ones, tuple(moves[is_open].T)), (len(keys),) * 2)
-        _, self._region_of = sparse.csgraph.connected_components(graph, directed=False)
+        self._region_of = connected_parts(moves[is_open], len(keys))
         self._n_sets = n_sets
         closed = np.flatnonzero(keys)
         pairs = zip(self._region_of[closed].tolist(), keys[closed].tolist(), strict=True)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybridnav._base.rows import unique_rows
+from hybridnav._base.rows import connected_parts, unique_rows
 from hybridnav._base.trig import cos, hypots, sin, sines_and_cosines
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass, OccupancyGrid, RoomLabels
@@ -233,11 +233,8 @@ def _corners(edges: LongArray, cols: int) -> LongArray:
 
 def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> LongArray:
     """Return the row that each boundary is part of, int64 (n_boundaries,), dense."""
-    from scipy.sparse import coo_array  # noqa: PLC0415 - most imports of the package need no rooms
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-    from scipy.spatial import KDTree  # noqa: PLC0415
+    from scipy.spatial import KDTree  # noqa: PLC0415 - most imports of the package need no rooms
 
-    count = len(labels)
     squares = np.floor(sides / _THIN_M).astype(np.int64)
     thin = unique_rows(np.column_stack([boundary_of, squares])).first
     pair = unique_rows(np.sort(labels, axis=1)).number_of[boundary_of[thin]]
@@ -245,9 +242,7 @@ def _rows_of(labels: IntArray, boundary_of: LongArray, sides: FloatArray) -> Lon
     near = KDTree(np.column_stack([sides[thin], 2 * _ROW_M * pair])).query_pairs(
         _ROW_M, output_type="ndarray"
     )
-    one, other = boundary_of[thin[near]].T
-    joined = coo_array((np.ones(len(one)), (one, other)), shape=(count, count))
-    return connected_components(joined, directed=False)[1].astype(np.int64)
+    return connected_parts(boundary_of[thin[near]], len(labels))
 
 
 def _jambs(

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from hybridnav._base.rows import connected_parts
 from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.maps.clearance import clearance_cells
@@ -94,16 +95,11 @@ def _enterable(space_of: IntArray, level: Level, begins: BoolArray) -> BoolArray
     return np.bincount(spaces, weights=joined[parts], minlength=len(begins)) > 0
 
 
-def free_components(level: Level) -> IntArray:
-    """Return the connected set of each vertex of a level, int32 (n_vertices,), joined by arcs
+def free_components(level: Level) -> LongArray:
+    """Return the connected set of each vertex of a level, int64 (n_vertices,), joined by arcs
     between free ones alone."""
-    from scipy.sparse import coo_array  # noqa: PLC0415 - most callers need none
-    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
-
     arcs = level.arcs[(level.classes == CellClass.FREE)[level.arcs].all(axis=1)]
-    shape = (level.n_vertices, level.n_vertices)
-    graph = coo_array((np.ones(len(arcs)), (arcs[:, 0], arcs[:, 1])), shape=shape)
-    return connected_components(graph, directed=False)[1]
+    return connected_parts(arcs, level.n_vertices)
 
 
 # Kinds of rooms by their shapes: corridors and halls.

@@ -6,9 +6,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
+from hybridnav._base.rows import connected_parts
 from hybridnav._base.trig import hypots
 from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
@@ -121,12 +120,12 @@ def _joined(
     unknown = np.stack([np.arange(n), largest], axis=1)[old_of == NO_ROOM]
     in_one = room_of[one] == room_of[other]
     kept = np.concatenate([unknown, pairs[in_one & (width > _WIDER * before + _SLACK_M)]])
-    part_of = _parts(kept, n)
+    part_of = connected_parts(kept, n)
     shares = _shares(part_of, old_of + 1, area * (old_of != NO_ROOM))
     most = np.where(2 * shares.max(axis=1) > shares.sum(axis=1), shares.argmax(axis=1) - 1, NO_ROOM)
     is_old = (was[:, 0] == was[:, 1]) & (was >= 0).all(axis=1) & ~in_one
     is_old &= (was == most[part_of[pairs]]).all(axis=1) & ~(before > _WIDER * width + _SLACK_M)
-    return _parts(np.concatenate([kept, pairs[is_old]]), n)
+    return connected_parts(np.concatenate([kept, pairs[is_old]]), n)
 
 
 def _shares(of: LongArray, room_of: LongArray, area: LongArray) -> FloatArray:
@@ -134,12 +133,6 @@ def _shares(of: LongArray, room_of: LongArray, area: LongArray) -> FloatArray:
     shares = np.zeros((of.max() + 1, room_of.max() + 1))
     np.add.at(shares, (of, room_of), area)
     return shares
-
-
-def _parts(links: LongArray, n: int) -> LongArray:
-    """Return the connected part of each of some pieces."""
-    graph = sparse.coo_array((np.ones(len(links)), tuple(links.T)), (n, n))
-    return csgraph.connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _old_rooms(old: Side, new: Side) -> IntArray:

@@ -11,9 +11,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import breadth_first_order
 
-from hybridnav._base.typing import BoolArray, IntArray, LongArray
+from hybridnav._base.rows import connected_parts
+from hybridnav._base.typing import BoolArray, LongArray
 from hybridnav.pyramid import Level
 from hybridnav.pyramid.graphs import FaceKind
 from hybridnav.pyramid.islands import Islands
@@ -175,7 +176,7 @@ class Inclusion:
             return self.ring_round_component(int(component))
         left = np.flatnonzero(~gone)
         outer = np.flatnonzero(dual.kinds == FaceKind.OUTSIDE)
-        group = _groups(level.arcs[left], level.n_vertices)
+        group = connected_parts(level.arcs[left], level.n_vertices)
         on_outside = self._origin[np.isin(dual.face_of, outer)]
         mine = on_outside[self._component_of_place[on_outside] == component][0]
         darts = np.flatnonzero(np.isin(dual.face_of, opened) & ~np.repeat(gone, 2))
@@ -235,17 +236,11 @@ def _value_at(values: LongArray, index: LongArray) -> LongArray:
     return np.append(values, -1)[index]
 
 
-def _groups(arcs: LongArray | IntArray, n_vertices: int) -> LongArray:
-    ones = np.ones(len(arcs), dtype=np.int8)
-    graph = coo_array((ones, (arcs[:, 0], arcs[:, 1])), shape=(n_vertices, n_vertices))
-    return connected_components(graph, directed=False)[1].astype(np.int64)
-
-
 def _loop_tree(level: Level) -> tuple[LongArray, LongArray]:
     """Return the self-loop above each block of faces (-1: a root), and the block of each face."""
     dual = level.dual
     loops = np.flatnonzero(level.is_self_loop)
-    block_of_face = _groups(dual.edges[~level.is_self_loop], dual.n_faces)
+    block_of_face = connected_parts(dual.edges[~level.is_self_loop], dual.n_faces)
     n_blocks = int(block_of_face.max(initial=-1)) + 1
     both_blocks = block_of_face[dual.edges[loops]]
     roots = np.unique(block_of_face[dual.kinds == FaceKind.OUTSIDE])
