@@ -14,11 +14,7 @@ from tests.strategies import Scene
 
 Cell = tuple[int, int]
 
-CHOICES = [
-    ("paper", ()),
-    ("grid-astar", ()),
-    ("octile", ()),
-]
+CHOICES = [("paper", ()), ("grid-astar", ()), ("octile", ())]
 """Presets whose paths are paths of cells by length, and settings."""
 
 DIRECTIONS = tuple(move for move in itertools.product((-1, 0, 1), repeat=2) if move != (0, 0))

@@ -12,11 +12,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-_INTEGERS = {
-    "int32": (-(2**31), 2**31 - 1),
-    "uint32": (0, 2**32 - 1),
-    "uint16": (0, 2**16 - 1),
-}
+_INTEGERS = {"int32": (-(2**31), 2**31 - 1), "uint32": (0, 2**32 - 1), "uint16": (0, 2**16 - 1)}
 _LARGEST_FLOAT32 = 3.402823466e38
 
 DEFINITIONS = {

@@ -322,9 +322,7 @@ LEAVES = (
 
 @given(path=st.sampled_from(LEAVES), value=ANYTHING, whole=st.booleans())
 @settings(max_examples=examples(150), deadline=None)
-def test_whatever_stands_in_a_field_makes_a_grid_or_one_line(
-    path: tuple[str, ...], value: Any, *, whole: bool
-) -> None:
+def test_whatever_stands_in_a_field_makes_a_grid_or_one_line(path, value, *, whole):
     hostile: Any = value if whole else message([0, 100], 2, 1)
     if not whole:
         inner = hostile

@@ -46,9 +46,7 @@ def test_the_wing_is_registered() -> None:
     assert "graph" in set(extension.extensions("methods"))
 
 
-def test_entry_points_are_those_that_importlib_finds(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_entry_points_are_those_that_importlib_finds(monkeypatch, tmp_path):
     about = tmp_path / "planners_of_mine-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: planners-of-mine\nVersion: 1.0\n")

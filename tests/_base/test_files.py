@@ -10,9 +10,7 @@ from hybridnav._base.files import remove_unfinished, replace_file
 
 
 @pytest.mark.parametrize("fails_in", ["write_bytes", "replace"])
-def test_a_file_that_cannot_be_written_whole_stays_as_it_was(
-    fails_in: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_cannot_be_written_whole_stays_as_it_was(fails_in, tmp_path, monkeypatch):
     file = tmp_path / "rooms.yaml"
     replace_file(file, b"old")
 
@@ -30,9 +28,7 @@ def test_a_file_that_cannot_be_written_whole_stays_as_it_was(
     assert file.read_bytes() == b"new"
 
 
-def test_what_is_half_written_when_the_process_ends_is_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_half_written_when_the_process_ends_is_removed(tmp_path, monkeypatch):
     write: Callable[..., int] = Path.write_bytes
 
     def write_and_end(path: Path, content: bytes) -> int:

@@ -98,13 +98,7 @@ def test_points_on_one_line_do_not_break_the_even_spacing() -> None:
 @given(start=POSE, goal=POSE, radius_m=st.floats(0.3, 2), reverses=st.booleans(), spacing_m=SPACING)
 @example(start=(0.0, 0.0, 0.0), goal=(0.0, 1.0, 0.0), radius_m=0.5, reverses=False, spacing_m=3.0)
 @settings(deadline=None)
-def test_poses_on_curves(
-    start: Any,
-    goal: Any,
-    radius_m: float,
-    reverses: bool,  # noqa: FBT001
-    spacing_m: float,
-) -> None:
+def test_poses_on_curves(start, goal, radius_m, reverses, spacing_m):
     assume(math.dist(start[:2], goal[:2]) > 0.01)
     # Poses farther apart than half a circle do not tell which way round the robot drove.
     spacing_m = min(spacing_m, 2.9 * radius_m)

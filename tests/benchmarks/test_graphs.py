@@ -181,10 +181,7 @@ def test_an_edge_through_walls_is_found(name, tmp_path, monkeypatch):
         n_nodes = graph.n_nodes
         extra = np.array([(tail, head) for tail in range(n_nodes) for head in range(n_nodes)])
         return replace(
-            graph,
-            edges=extra,
-            edge_names=(None,) * len(extra),
-            costs=np.full(len(extra), np.nan),
+            graph, edges=extra, edge_names=(None,) * len(extra), costs=np.full(len(extra), np.nan)
         )
 
     spoiled(joined_to_all, monkeypatch)

@@ -50,9 +50,7 @@ def passed(method: HpaStar, answer: MethodResult) -> list[int]:
 
 @settings(max_examples=examples(60))
 @given(classes=class_grids(), side=SIDES, seed=st.integers(0, 1000))
-def test_paths_are_legal_never_too_short_and_found_where_there_is_one(
-    classes: Any, side: int, seed: int
-) -> None:
+def test_paths_are_legal_never_too_short_and_found_where_there_is_one(classes, side, seed):
     grid = occupancy_grid(classes)
     enterable = classes == CellClass.FREE
     raw = HpaStar(grid, cluster_cells=side, smooth=False)
@@ -104,9 +102,7 @@ def test_regions_are_the_connected_pieces_of_the_clusters(classes: Any, side: in
 
 @settings(max_examples=examples(30))
 @given(classes=class_grids(24), side=SIDES)
-def test_edges_are_shortest_paths_inside_clusters_and_steps_between_them(
-    classes: Any, side: int
-) -> None:
+def test_edges_are_shortest_paths_inside_clusters_and_steps_between_them(classes, side):
     method = HpaStar(occupancy_grid(classes), cluster_cells=side)
     graph = method._graph
     cols = classes.shape[1]
@@ -153,13 +149,7 @@ def test_runs_end_where_clusters_do_and_at_obstacles() -> None:
 
 
 def test_start_and_goal_in_one_cluster_take_the_better_way() -> None:
-    classes = drawn(
-        "..........",
-        "..........",
-        "..........",
-        ".####.....",
-        "..........",
-    )
+    classes = drawn("..........", "..........", "..........", ".####.....", "..........")
     method = HpaStar(occupancy_grid(classes), cluster_cells=5, smooth=False)
     left, right = int(method.region_of[0, 0]), int(method.region_of[0, 9])
     inside = method.solve((3, 0), (3, 3))
@@ -184,7 +174,7 @@ def test_pieces_of_one_cluster_are_joined_through_others() -> None:
 
 
 @pytest.mark.parametrize("smooth", [True, False])
-def test_start_is_goal(smooth: bool) -> None:  # noqa: FBT001
+def test_start_is_goal(smooth: bool) -> None:
     method = HpaStar(occupancy_grid(np.ones((25, 25), dtype=np.uint8)), smooth=smooth)
     answer = method.solve((9, 9), (9, 9))
     assert answer.cells is not None
@@ -307,9 +297,7 @@ def test_solvability_is_that_of_the_grid(scene: Scene, epsilon: int, seed: int) 
 
 @settings(max_examples=examples(40))
 @given(scene=scenes(), epsilon=st.sampled_from([1, 3, 10]))
-def test_critical_points_are_free_and_their_basis_points_are_obstacles_on_two_sides(
-    scene: Scene, epsilon: int
-) -> None:
+def test_critical_points_are_free_and_their_basis_points_are_obstacles_on_two_sides(scene, epsilon):
     made = ThrunMap(scene.grid, epsilon_cells=epsilon)
     padded = np.pad(scene.classes == CellClass.FREE, 1)
     clearance = np.asarray(ndimage.distance_transform_edt(padded))

@@ -9,15 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.rivals import (
-    NanoAstar,
-    Networkx,
-    Pyastar2d,
-    RoutingKit,
-    ScikitImage,
-    Scipy,
-    Tcod,
-)
+from benchmarks.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, ScikitImage, Scipy, Tcod
 from benchmarks.rivals_any_angle import ExtremityPathfinder, OmplWhole
 from benchmarks.subjects._study_run import RIVALS
 from hybridnav.errors import InvalidValueError, OmplError, UnsuitableMapError

@@ -12,9 +12,7 @@ from tests.oracle.grid import distances, move_graph
 
 
 @pytest.mark.parametrize("kind", ["small", "large"])
-def test_plans_on_tiles_are_as_long_as_scipy_finds(
-    monkeypatch: pytest.MonkeyPatch, kind: str
-) -> None:
+def test_plans_on_tiles_are_as_long_as_scipy_finds(monkeypatch, kind):
     """Tiles of a building and its mirror images, joined by streets; as a large map is planned on
     too, whose graphs are built behind the queries."""
     if kind == "large":

@@ -78,9 +78,7 @@ def test_links_and_doors_are_closed(cli: Any, file: Path) -> None:
         ((*QUERY, "--language", "fr"), "language must be one of"),
     ],
 )
-def test_wrong_usage_is_one_line(
-    cli: Any, file: Path, arguments: tuple[str, ...], message: str
-) -> None:
+def test_wrong_usage_is_one_line(cli, file, arguments, message):
     ran = cli("plan", file, *arguments)
     assert ran.code == 2
     assert message in ran.err
@@ -291,10 +289,7 @@ def test_a_link_that_the_robot_does_not_fit_in_is_left_out(sideways):
     assert [link.name for link in hn.ext.fleet.building_graph(building).links] == ["ladder"]
 
 
-USES = {
-    "rooms-1.yaml": (("{name: hall,", "{name: hall, use: private,"),),
-    "rooms-2.yaml": (),
-}
+USES = {"rooms-1.yaml": (("{name: hall,", "{name: hall, use: private,"),), "rooms-2.yaml": ()}
 
 
 @pytest.fixture(scope="module")
@@ -479,9 +474,7 @@ def test_a_tour_by_rooms_goes_on_where_a_leg_ended(cli: Any, file: Path) -> None
 
 
 @pytest.mark.parametrize(("language", "word"), [("en", "Floor"), ("de", "Etage")])
-def test_the_tightest_places_of_a_route_have_their_floors(
-    cli: Any, file: Path, language: str, word: str
-) -> None:
+def test_the_tightest_places_of_a_route_have_their_floors(cli, file, language, word):
     told = cli("plan", file, *QUERY, "--why", "--language", language).out
     assert f"why        {word} 1: " in told
     assert f"           {word} 2: " in told

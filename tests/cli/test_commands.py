@@ -48,13 +48,7 @@ def draw(tmp_path):
 def rooms(draw):
     """Two rooms with one door, an unexplored corner, and a closet without a door."""
     return draw(
-        "#########",
-        "#...#?..#",
-        "#.......#",
-        "#...#...#",
-        "#########",
-        "#.......#",
-        "#########",
+        "#########", "#...#?..#", "#.......#", "#...#...#", "#########", "#.......#", "#########"
     )
 
 

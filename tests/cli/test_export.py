@@ -224,11 +224,7 @@ def test_rooms_and_places_are_written_as_tables_and_features(cli, tmp_path):
 
 def test_options_of_graphs_are_refused_for_rooms_and_places(cli, tmp_path):
     places = ("export", FIGURE, "--format", "places", "-o", tmp_path / "p.csv")
-    for option in (
-        ("--spacing", 3),
-        ("--report", 9),
-        ("--plot", tmp_path / "p.png"),
-    ):
+    for option in (("--spacing", 3), ("--report", 9), ("--plot", tmp_path / "p.png")):
         assert cli(*places, *option).refuses(2, option[0], "--format nav2")
     assert cli(*places[:-1], tmp_path / "p.json").refuses(2, "--out", ".csv, .geojson")
     graph = ("export", FIGURE, "-o", tmp_path / "g.csv")

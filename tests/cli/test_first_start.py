@@ -80,9 +80,7 @@ def test_the_user_is_told_once_and_only_of_seconds(capsys: pytest.CaptureFixture
     assert capsys.readouterr().err == ""
 
 
-def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_next_start_that_is_quick_is_not_promised_where_nothing_is_kept(capsys):
     with notice_of_compiling():
         KERNELS.info("compiled", extra={"seconds": 9.0, "is_kept": False})
     assert capsys.readouterr().err == ""
@@ -152,9 +150,7 @@ def test_a_model_leaves_nothing_to_compile_for_plans_on_it(tmp_path: Path) -> No
     assert counts[1:] == counts[:1] * 2
 
 
-def test_set_up_compiles_whole_plans_not_their_searches_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_set_up_compiles_whole_plans_not_their_searches_alone(monkeypatch):
     done: dict[str, list[str]] = {"compile_plan": [], "compile_search": []}
     for name, jobs in done.items():
         monkeypatch.setattr(warm, name, jobs.append)

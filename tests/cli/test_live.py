@@ -76,9 +76,7 @@ def test_the_end_by_the_number_of_goals_is_stated(cli: Any, plan: Path) -> None:
         (("--plot", "made.png"), "--plot must end in .gif"),
     ],
 )
-def test_wrong_options_end_in_one_line(
-    cli: Any, plan: Path, options: tuple[str, ...], said: str
-) -> None:
+def test_wrong_options_end_in_one_line(cli, plan, options, said):
     done = cli("explore", plan, *options)
     assert done.code in {2, 3}
     assert said in done.err
@@ -324,9 +322,7 @@ def test_scans_that_need_too_many_cells_are_counted(cli: Any, tmp_path: Path) ->
         (["a.log"], ["--every", "0"], "--every"),
     ],
 )
-def test_wrong_usage_ends_in_one_line(
-    cli: Any, files: list[str], options: list[str], message: str
-) -> None:
+def test_wrong_usage_ends_in_one_line(cli, files, options, message):
     done = cli("replay", *files, *options)
     assert (done.code, done.out) == (2, "")
     assert message in done.err

@@ -93,9 +93,7 @@ def test_the_edges_of_a_graph_lead_one_way(cli, map_file: Path, tmp_path: Path) 
     assert cli("plan", map_file, *BACK, *shut, "--robot-radius", "0").code == 1
 
 
-def test_a_graph_has_the_directions_of_the_rooms_beside_the_map(
-    cli, map_file: Path, tmp_path: Path
-) -> None:
+def test_a_graph_has_the_directions_of_the_rooms_beside_the_map(cli, map_file, tmp_path):
     free = map_file.parent / "free.geojson"
     radius = ("--robot-radius", "0")
     assert cli("export", map_file, *radius, "-o", free).code == 0

@@ -59,9 +59,7 @@ def closed_by(blocked: hn.Blocked, grid: hn.OccupancyGrid) -> list[int]:
         ("MultiLineString", [LINE, [[1, 5], [3.5, 6.5], [7, 5]]]),
     ],
 )
-def test_geojson_closes_what_its_geometries_close(
-    grid: hn.OccupancyGrid, tmp_path: Any, kind: str, coordinates: Any
-) -> None:
+def test_geojson_closes_what_its_geometries_close(grid, tmp_path, kind, coordinates):
     area = shapely.force_2d(shapely.geometry.shape(geometry(kind, coordinates)))
     expected = closed_by(hn.Blocked(polygons=[area]), grid)
     assert expected
@@ -115,9 +113,7 @@ def test_geojson_closes_what_its_geometries_close(
          "feature 2: an area must meet the map, which spans x 0.00 to 9.00 m"),
     ],
 )  # fmt: skip
-def test_hostile_geojson_ends_in_one_line(
-    grid: hn.OccupancyGrid, tmp_path: Any, data: Any, words: str
-) -> None:
+def test_hostile_geojson_ends_in_one_line(grid, tmp_path, data, words):
     path = tmp_path / "works.geojson"
     path.write_bytes(data if isinstance(data, bytes) else json.dumps(data).encode())
     with pytest.raises(hn.errors.MapError) as caught:
@@ -136,9 +132,7 @@ WHOLE = json.dumps(collection(geometry("Polygon", BOX), geometry("LineString", L
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-def test_damaged_geojson_is_read_or_refused(
-    grid: hn.OccupancyGrid, tmp_path: Any, data: Any
-) -> None:
+def test_damaged_geojson_is_read_or_refused(grid, tmp_path, data):
     content = bytearray(WHOLE[: data.draw(st.integers(0, len(WHOLE)))])
     for at in data.draw(st.lists(st.integers(0, max(len(content) - 1, 0)), max_size=3)):
         if content:
@@ -282,9 +276,7 @@ def test_the_command_closes_doors_rooms_and_files(cli: Any, query: Any, tmp_path
 
 
 @pytest.mark.parametrize("endpoints", [POINTS, ("--from", "1.5,5.5", "--to", "7.5,5.5")])
-def test_json_has_the_same_keys_however_ends_are_given(
-    cli: Any, query: Any, tmp_path: Any, endpoints: Any
-) -> None:
+def test_json_has_the_same_keys_however_ends_are_given(cli, query, tmp_path, endpoints):
     closed = ("--blocked", tmp_path / "line.geojson")
     far = [text.replace("7.5,5.5", "99,99") for text in endpoints]
     for rooms in ((), ("--rooms", tmp_path / "rooms.yaml")):
@@ -297,9 +289,7 @@ def test_json_has_the_same_keys_however_ends_are_given(
         assert {"load", "pyramid", "prepare", "mesh", "shortest"} <= seconds.keys()
 
 
-def test_a_comparison_closes_the_same_for_the_whole_grid(
-    cli: Any, query: Any, tmp_path: Any
-) -> None:
+def test_a_comparison_closes_the_same_for_the_whole_grid(cli, query, tmp_path):
     closed = ("--preset", "octile", "--blocked", tmp_path / "mask.png")
     done = cli(*query, *POINTS, "--compare", *closed, "--json").answer
     assert done["status"] == "solved"

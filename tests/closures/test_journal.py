@@ -47,9 +47,7 @@ def test_what_is_closed_stays_closed_until_it_is_opened(tmp_path: Path) -> None:
         ('1:room:"quoted" ümlaut 😀', (None, "1", (), ('"quoted" ümlaut 😀',))),
     ],
 )
-def test_names_are_read_as_they_were_written(
-    what: str, expected: tuple[object, ...], tmp_path: Path
-) -> None:
+def test_names_are_read_as_they_were_written(what, expected, tmp_path):
     Journal(tmp_path / "a.yaml").close(what)
     (item,) = Journal(tmp_path / "a.yaml").items()
     assert (item.link, item.floor, item.blocked.doors, item.blocked.rooms) == expected
@@ -131,9 +129,7 @@ def test_every_character_of_a_line_survives(tmp_path: Path) -> None:
         assert Journal(tmp_path / "a.yaml").items() == tuple(items)
 
 
-def test_who_changes_a_journal_does_not_read_it_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_changes_a_journal_does_not_read_it_again(tmp_path, monkeypatch):
     reads: list[int] = []
     entries = Journal._entries
 

@@ -63,9 +63,7 @@ def test_moves_are_those_of_the_definition(lines: list[list[tuple[int, int]]]) -
     st.floats(0, 6.28),
     st.tuples(st.floats(-5, 5), st.floats(-5, 5)),
 )
-def test_a_line_in_any_frame_is_the_same_and_turned_round_its_sides_are(
-    line: list[tuple[int, int]], yaw: float, at: tuple[float, float]
-) -> None:
+def test_a_line_in_any_frame_is_the_same_and_turned_round_its_sides_are(line, yaw, at):
     plain = open_map((9, 9))
     frame = Frame(resolution_m=0.5, origin_m=at, yaw_rad=yaw)
     turned = frame.points_of_grid(np.array(line, dtype=float)[:, ::-1] + 1.1)

@@ -12,15 +12,7 @@ import hybridnav as hn
 from hybridnav.graphs import build_lane_graph, export_bundle
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.nav2_reader import read_nav2
-from tests.nav2_robot import (
-    Mask,
-    ZoneFilter,
-    called,
-    is_lethal,
-    read_bundle,
-    score,
-    speed_limit,
-)
+from tests.nav2_robot import Mask, ZoneFilter, called, is_lethal, read_bundle, score, speed_limit
 
 
 def bundle_of(here, folder, **options):

@@ -266,8 +266,7 @@ def test_an_edge_to_a_node_that_is_not_there(features, checked):
 
 
 @pytest.mark.parametrize(
-    ("cost", "kind"),
-    [(-0.1, "bad-cost"), (float("nan"), "stops-loader"), ("dear", "stops-loader")],
+    ("cost", "kind"), [(-0.1, "bad-cost"), (float("nan"), "stops-loader"), ("dear", "stops-loader")]
 )
 def test_a_cost_that_is_none(features, checked, cost, kind):
     edge = edges_of(features)[0]

@@ -82,9 +82,7 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("ending", WRITERS)
-def test_what_is_written_has_one_way_edges_and_is_read_so(
-    topology: hn.TopologicalMap, built: RouteGraph, ending: str, tmp_path: Path
-) -> None:
+def test_what_is_written_has_one_way_edges_and_is_read_so(topology, built, ending, tmp_path):
     assert ways(built) == {("lower", "right"), ("upper", "left")}
     file = tmp_path / f"graph{ending}"
     WRITERS[ending](topology, built, file)
@@ -112,9 +110,7 @@ def test_lanes_keep_the_directions(topology: hn.TopologicalMap, built: RouteGrap
     assert ways(keep_right(topology, built, apart_m=0.6)) == ways(built)
 
 
-def test_reports_compare_with_the_shortest_legal_paths(
-    topology: hn.TopologicalMap, built: RouteGraph
-) -> None:
+def test_reports_compare_with_the_shortest_legal_paths(topology, built):
     plain, legal = (judge_route_graph(built, pairs=200, topology=one) for one in (None, topology))
     assert plain.nearest.greatest > 1
     assert legal.nearest.greatest < 0.6

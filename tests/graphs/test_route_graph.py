@@ -7,7 +7,6 @@ import warnings
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -165,9 +164,7 @@ def walk(graph: hn.graphs.RouteGraph, rng: np.random.Generator, steps: int) -> l
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_route_has_the_ids_and_costs_of_the_exported_file(
-    graph: hn.graphs.RouteGraph, seed: int, tmp_path: Any
-) -> None:
+def test_a_route_has_the_ids_and_costs_of_the_exported_file(graph, seed, tmp_path):
     hn.graphs.export_nav2(graph, tmp_path / "graph.geojson")
     file = read_nav2(tmp_path / "graph.geojson")
     nodes = walk(graph, np.random.default_rng(seed), seed)
@@ -201,9 +198,7 @@ def test_a_route_has_the_ids_and_costs_of_the_exported_file(
         ([0, 0], "no edge leads from node 0 to node 0"),
     ],
 )
-def test_wrong_routes_are_refused_in_one_line(
-    graph: hn.graphs.RouteGraph, nodes: Any, words: str
-) -> None:
+def test_wrong_routes_are_refused_in_one_line(graph, nodes, words):
     with pytest.raises(hn.errors.InvalidValueError, match=words):
         route_messages(graph, nodes)
 

@@ -33,11 +33,7 @@ def instruction(kind="turn", after_m=8.0, space=CORRIDOR, **what):
 
 TURN, BACK, SHARP = Turn(-1.5), Turn(math.pi), Turn(2.5)
 CASES = {
-    "start": (
-        instruction("start", 0.0, KITCHEN),
-        "start in the kitchen",
-        "Start in „kitchen“",
-    ),
+    "start": (instruction("start", 0.0, KITCHEN), "start in the kitchen", "Start in „kitchen“"),
     "start facing": (
         instruction("start", 0.0, LAB, turn=TURN),
         "start in l3_404 and face right",

@@ -209,9 +209,7 @@ def test_the_same_run_can_be_shown_by_lengths(folder: Any) -> None:
     assert outcome_of(study, "shortest").losses == pytest.approx(0, abs=1e-6)
 
 
-def test_a_run_resumes_and_refuses_other_costs(
-    settings: RunSettings, folder: Any, tmp_path: Any
-) -> None:
+def test_a_run_resumes_and_refuses_other_costs(settings, folder, tmp_path):
     lines = (folder / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     (tmp_path / RECORDS_FILE).write_bytes(b"".join(lines[: len(lines) // 2]))
     assert write_records(settings, tmp_path) == len(lines) - len(lines) // 2
@@ -275,18 +273,14 @@ def test_cells_that_costs_close_are_occupied_for_all(settings: RunSettings, tmp_
         (layer_of(np.ones((3, 4))), "costs of 4 x 3 cells are not those of a map of"),
     ],
 )
-def test_wrong_costs_are_refused_in_one_line(
-    settings: RunSettings, tmp_path: Any, costs: Any, message: str
-) -> None:
+def test_wrong_costs_are_refused_in_one_line(settings, tmp_path, costs, message):
     with pytest.raises(hn.errors.InvalidValueError, match=message) as refused:
         write_records(replace(settings, costs=costs), tmp_path / "run")
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "run").exists()
 
 
-def test_a_preset_with_costs_of_its_own_takes_those_of_the_run(
-    settings: RunSettings, tmp_path: Any
-) -> None:
+def test_a_preset_with_costs_of_its_own_takes_those_of_the_run(settings, tmp_path):
     own = hn.load_preset("paper", overrides=["planner.costs.clearance={}"])
     only = replace(settings, baselines=(), presets=(own,), pairs=5)
     with pytest.raises(

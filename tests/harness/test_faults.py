@@ -26,14 +26,7 @@ from hybridnav.harness.run import RunSettings, write_records
 from hybridnav.harness.scenes import Pair
 from hybridnav.harness.yardstick import KINDS, contradiction
 from tests.harness import faulty_methods as faulty
-from tests.harness.small_runs import (
-    ROOMS,
-    importable,
-    label_of,
-    name_of,
-    outcome_of,
-    write_map,
-)
+from tests.harness.small_runs import ROOMS, importable, label_of, name_of, outcome_of, write_map
 
 FAULTS = {
     faulty.ThroughWall: "is not free",
@@ -197,10 +190,7 @@ def test_a_failing_method_leaves_records_and_the_run_goes_on(study):
 
 @pytest.mark.parametrize(
     ("method", "words"),
-    [
-        (faulty.CannotBeMade, "RuntimeError: too small a map"),
-        (faulty.FailsAtOnce, "KeyError"),
-    ],
+    [(faulty.CannotBeMade, "RuntimeError: too small a map"), (faulty.FailsAtOnce, "KeyError")],
 )
 def test_a_preparation_that_fails_fails_all_its_pairs(study, method, words):
     outcome = outcome_of(study, method)

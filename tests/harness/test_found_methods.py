@@ -73,7 +73,7 @@ def outcome_of(method: type, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 )
 def test_a_search_method_is_asked_and_judged_like_any_other(
     method: type[ByCells],
-    is_faulty: bool,  # noqa: FBT001
+    is_faulty: bool,
     share: int,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -145,12 +145,7 @@ class ProvingAnother(Proving):
         (ProvingAnother, "the proof is about other ends"),
     ],
 )
-def test_proofs_of_a_method_are_checked_and_counted(
-    method: type[Proving],
-    text: str | None,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_proofs_of_a_method_are_checked_and_counted(method, text, tmp_path, monkeypatch):
     outcome = outcome_of(method, tmp_path, monkeypatch)
     row = consistency_row([outcome])
     pairs = len(outcome.records)

@@ -15,11 +15,7 @@ from hybridnav.errors import InvalidValueError, UnsuitableMapError
 from hybridnav.harness.analysis import load_study, rows_of_map, rows_of_study
 from hybridnav.harness.baselines import MethodResult
 from hybridnav.harness.baselines.grid import GridAstar
-from hybridnav.harness.columns import (
-    EFFICIENCY_COLUMNS,
-    figures,
-    loss_columns,
-)
+from hybridnav.harness.columns import EFFICIENCY_COLUMNS, figures, loss_columns
 from hybridnav.harness.names import NamedMethod
 from hybridnav.harness.output import rows_of_methods, write_outputs
 from hybridnav.harness.records import read_records

@@ -11,13 +11,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import VisibilityGraph
 from tests.strategies import drawn, framed, occupancy_grid
 
-WALL = drawn(
-    "..........",
-    "..........",
-    ".########.",
-    "..........",
-    "..........",
-)
+WALL = drawn("..........", "..........", ".########.", "..........", "..........")
 
 
 def test_the_optimum_is_that_of_the_visibility_graph():

@@ -92,9 +92,7 @@ def worlds(**radius: Any) -> hn.OccupancyGrid:
 
 
 @pytest.mark.parametrize("make", [arrays, files, ros_files, worlds])
-def test_who_gives_no_radius_gets_a_robot_and_who_gives_0_a_point(
-    make: Callable[..., hn.OccupancyGrid],
-) -> None:
+def test_who_gives_no_radius_gets_a_robot_and_who_gives_0_a_point(make):
     for grid in (make(), make(robot_radius_m=None)):
         assert grid.robot_radius_m == DEFAULT_ROBOT_RADIUS_M == 0.25
         assert grid.radius_is_default

@@ -29,10 +29,7 @@ def _grid(rows, frame=None, **settings):
 
 coordinates = st.floats(-1000, 1000)
 frames = st.builds(
-    Frame,
-    st.floats(0.001, 10),
-    st.tuples(coordinates, coordinates),
-    st.floats(-math.pi, math.pi),
+    Frame, st.floats(0.001, 10), st.tuples(coordinates, coordinates), st.floats(-math.pi, math.pi)
 )
 cells = hnp.arrays(
     np.int64, st.tuples(st.integers(1, 8), st.just(2)), elements=st.integers(0, 5000)
@@ -211,11 +208,7 @@ def test_the_darts_of_the_largest_grid_have_numbers_in_32_bits():
     assert 4 * MAX_CELLS < 2**31
 
 
-FRAMES = [
-    hn.Frame(),
-    hn.Frame(0.05, (-3.0, 7.5), 0.3),
-    hn.Frame(0.1, (4e5, -5e6), -2.5),
-]
+FRAMES = [hn.Frame(), hn.Frame(0.05, (-3.0, 7.5), 0.3), hn.Frame(0.1, (4e5, -5e6), -2.5)]
 POSITIONS = np.random.default_rng(3).uniform(-40, 40, (4, 5, 2))
 
 

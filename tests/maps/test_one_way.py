@@ -72,9 +72,7 @@ def test_files_and_models_keep_rules(rooms, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("given", ["door:1=halls", "door=1", "{door: 1}", "[1]"])
-def test_a_wrong_rule_in_a_file_is_refused_with_its_place(
-    rooms, given: str, tmp_path: Path
-) -> None:
+def test_a_wrong_rule_in_a_file_is_refused_with_its_place(rooms, given, tmp_path):
     labels, grid = rooms
     file = tmp_path / "rooms.yaml"
     hn.save_rooms(file, labels, grid)

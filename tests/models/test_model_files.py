@@ -77,9 +77,7 @@ def test_a_model_with_portals_is_to_be_built_anew(tmp_path: Path) -> None:
     assert "no planner uses portals any more: build the model anew" in refusal(path)
 
 
-def test_a_model_with_settings_that_are_gone_is_to_be_built_anew(
-    content: bytes, tmp_path: Path
-) -> None:
+def test_a_model_with_settings_that_are_gone_is_to_be_built_anew(content, tmp_path):
     path = tmp_path / "m.hnm"
     old = {"coarse": "jumps", "refine": "none"}
     path.write_bytes(altered(content, put("preset", "values", "planner", to=old)))
@@ -240,9 +238,7 @@ INDICES = [
 
 @pytest.mark.parametrize("value", [-2, 1 << 30])
 @pytest.mark.parametrize(("kind", "name"), INDICES)
-def test_an_index_out_of_range_is_found_though_its_checksum_is_right(
-    kind: str, name: str, value: int, tmp_path: Path
-) -> None:
+def test_an_index_out_of_range_is_found_though_its_checksum_is_right(kind, name, value, tmp_path):
     path = tmp_path / "m.hnm"
     hn.save(planners(), path)
     found = [filed.read() for filed in container.read_parts(path)]

@@ -14,17 +14,11 @@ from hypothesis import given, settings
 import hybridnav as hn
 from benchmarks.worlds import figure1_world
 from hybridnav.models import structures
-from hybridnav.models.structures import Structure
 from hybridnav.pyramid.record import Record
-from hybridnav.search.mesh import (
-    ConvexMesh,
-    CornerGraph,
-    CornerHierarchy,
-    MeshSearch,
-)
+from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.search.octile.jumps import JumpGraph
 from tests.product.test_copies import assert_alike, kernels
-from tests.strategies import Scene, examples, scenes
+from tests.strategies import examples, scenes
 
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 PRESETS = [name for name in hn.preset_names() if name != "ompl"]
@@ -83,9 +77,7 @@ def test_a_planner_comes_back_bit_by_bit(preset: str, tmp_path: Path, *, compres
     same_answers(saved, pickle.loads(pickle.dumps(came_back)))  # noqa: S301 - our own
 
 
-def test_a_graph_that_took_too_long_to_contract_comes_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_graph_that_took_too_long_to_contract_comes_back(tmp_path, monkeypatch):
     monkeypatch.setattr("hybridnav.search.mesh.build._MOST_LOOKED", 0)
     saved = hn.HybridPlanner(topology())
     saved.prepare()
@@ -180,9 +172,7 @@ def test_a_map_and_a_grid_alone_are_models_too(tmp_path: Path) -> None:
 
 @given(scene=scenes(), compress=...)
 @settings(max_examples=examples(40))
-def test_any_grid_comes_back_bit_by_bit(
-    scene: Scene, tmp_path_factory: pytest.TempPathFactory, *, compress: bool
-) -> None:
+def test_any_grid_comes_back_bit_by_bit(scene, tmp_path_factory, *, compress):
     path = tmp_path_factory.mktemp("models") / "m.hnm"
     assert_alike(scene.grid, loaded(scene.grid, path, compress=compress).grid, set())
 
@@ -295,9 +285,7 @@ def test_a_model_is_named_as_one_and_written_where_there_is_room(tmp_path: Path)
         (structures.ROOMS, hn.RoomLabels, ("names", "points", "doors", "uses", "one_way")),
     ],
 )
-def test_a_description_names_every_attribute_of_its_class(
-    structure: Structure, made: Any, others: tuple[str, ...]
-) -> None:
+def test_a_description_names_every_attribute_of_its_class(structure, made, others):
     described = {field.name for field in structure.arrays} - {"field_of"}
     if dataclasses.is_dataclass(made):
         attributes = {field.name for field in dataclasses.fields(made)}

@@ -295,12 +295,7 @@ def check_cap(level: LevelLike, *, linkage: str, limit_m: float, resolution_m: f
 
 
 def check_links(
-    lower: LevelLike,
-    upper: LevelLike,
-    waiting: AnyArray,
-    *,
-    limit_m: float,
-    resolution_m: float,
+    lower: LevelLike, upper: LevelLike, waiting: AnyArray, *, limit_m: float, resolution_m: float
 ) -> None:
     """`survivor`: parent links are shorter than the cap, and all that can merge do.
 

@@ -29,7 +29,7 @@ PLAIN = settings(max_examples=examples(30), deadline=None, derandomize=True)
 
 @given(scene=scenes(max_side=24), allow=st.booleans())
 @PLAIN
-def test_bounds_hold_on_any_map(scene: Scene, allow: bool) -> None:  # noqa: FBT001
+def test_bounds_hold_on_any_map(scene: Scene, allow: bool) -> None:
     topology = built(scene)
     planners = planners_of(topology, f"planner.allow_unexplored={allow}".lower())
     enterable = topology.grid.enterable(allow_unexplored=allow)
@@ -39,7 +39,7 @@ def test_bounds_hold_on_any_map(scene: Scene, allow: bool) -> None:  # noqa: FBT
 
 @given(scene=scenes(max_side=24), allow=st.booleans())
 @PLAIN
-def test_bounds_hold_where_corners_may_be_cut(scene: Scene, allow: bool) -> None:  # noqa: FBT001
+def test_bounds_hold_where_corners_may_be_cut(scene: Scene, allow: bool) -> None:
     topology = built(scene, corner_cutting=True)
     planners = planners_of(topology, f"planner.allow_unexplored={allow}".lower())
     enterable = topology.grid.enterable(allow_unexplored=allow)
@@ -95,7 +95,7 @@ DRAWINGS = {
 
 @pytest.mark.parametrize("name", DRAWINGS)
 @pytest.mark.parametrize("corner_cutting", [False, True])
-def test_bounds_hold_for_all_pairs(name: str, corner_cutting: bool) -> None:  # noqa: FBT001
+def test_bounds_hold_for_all_pairs(name: str, corner_cutting: bool) -> None:
     for distance_m in (1.5, 4.0):
         scene = Scene(DRAWINGS[name], 1.0, distance_m, 0)
         topology = built(scene, corner_cutting=corner_cutting)

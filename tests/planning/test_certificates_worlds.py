@@ -12,14 +12,7 @@ import pytest
 import hybridnav as hn
 from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.scenes import sample_pairs
-from tests.certificates import (
-    Cell,
-    built,
-    check_pairs,
-    check_plan,
-    planners_of,
-    random_pairs,
-)
+from tests.certificates import Cell, built, check_pairs, check_plan, planners_of, random_pairs
 from tests.oracle.grid import components
 from tests.strategies import Scene
 

@@ -111,12 +111,7 @@ def test_paths_cost_little_more_than_the_best_that_a_fine_graph_finds() -> None:
 
 @given(class_grids(max_side=20), seeds, st.booleans(), st.booleans())
 @settings(max_examples=examples(40), deadline=None)
-def test_answers_follow_updates_as_a_planner_made_anew(
-    classes: Any,
-    seed: int,
-    prepared: bool,  # noqa: FBT001 - drawn
-    has_own: bool,  # noqa: FBT001 - drawn
-) -> None:
+def test_answers_follow_updates_as_a_planner_made_anew(classes, seed, prepared, has_own):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
     preset = preset_of()
@@ -166,11 +161,7 @@ def test_answers_follow_updates_as_a_planner_made_anew(
 
 @given(class_grids(max_side=20), seeds, st.booleans())
 @settings(max_examples=examples(20), deadline=None)
-def test_a_changed_map_is_planned_on_as_by_a_planner_made_anew(
-    classes: Any,
-    seed: int,
-    has_own: bool,  # noqa: FBT001 - drawn
-) -> None:
+def test_a_changed_map_is_planned_on_as_by_a_planner_made_anew(classes, seed, has_own):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
     chosen = preset_of()
@@ -307,7 +298,7 @@ def test_a_progress_callback_may_plan(preset: str) -> None:
 
 
 @pytest.mark.parametrize("is_built", [False, True])
-def test_a_progress_callback_may_change_costs(is_built: bool) -> None:  # noqa: FBT001 - drawn
+def test_a_progress_callback_may_change_costs(is_built: bool) -> None:
     grid = halls(60)
     layers = [
         layer_of(np.random.default_rng(seed).uniform(1, 4, grid.shape).round()) for seed in (1, 2)

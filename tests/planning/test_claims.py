@@ -14,7 +14,7 @@ from tests.strategies import examples, occupancy_grid
 
 
 @pytest.mark.parametrize("samples", [False, True])
-def test_random_plans_of_every_kind_state_what_they_drive(samples: bool) -> None:  # noqa: FBT001
+def test_random_plans_of_every_kind_state_what_they_drive(samples: bool) -> None:
     """`python -m benchmarks claims` plans 100,000."""
     if samples and importlib.util.find_spec("ompl") is None:
         pytest.skip("OMPL is not installed")

@@ -113,9 +113,7 @@ def forms_of(door: hn.Door) -> list[Any]:
     ]
 
 
-def test_a_shut_door_of_the_office_is_not_passed_and_the_others_are(
-    office: hn.HybridPlanner,
-) -> None:
+def test_a_shut_door_of_the_office_is_not_passed_and_the_others_are(office):
     topology, names = office.topology, ["room-1", "room-4"]
     cols = topology.grid.shape[1]
     opened = hn.plan_tour(office, names, at="point")
@@ -160,9 +158,7 @@ def test_a_room_of_the_office_closed_for_cleaning_is_not_entered(office: hn.Hybr
 
 
 @presets
-def test_each_door_of_the_house_shuts_alone(
-    planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_each_door_of_the_house_shuts_alone(planners, preset):
     planner = planners[preset]
     topology = planner.topology
     cols = topology.grid.shape[1]
@@ -198,9 +194,7 @@ def test_each_door_of_the_house_shuts_alone(
 
 
 @presets
-def test_ends_in_a_closed_room_are_named(
-    planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_ends_in_a_closed_room_are_named(planners, preset):
     planner = planners[preset]
     inside, outside = planner.grid.frame.points_of([(9, 2), (1, 7)])
     closed = {"rooms": ["kitchen"]}
@@ -214,9 +208,7 @@ def test_ends_in_a_closed_room_are_named(
 
 @presets
 @pytest.mark.parametrize("smooth", [None, "line-of-sight"])
-def test_many_answers_are_those_of_one_whatever_is_closed(
-    planners: dict[str, hn.HybridPlanner], preset: str, smooth: Any
-) -> None:
+def test_many_answers_are_those_of_one_whatever_is_closed(planners, preset, smooth):
     planner = planners[preset]
     grid = planner.grid
     cells = np.random.default_rng(7).integers(-1, np.array(grid.shape) + 1, size=(2, 60, 2))
@@ -279,9 +271,7 @@ def divided_maps(draw: st.DrawFn) -> hn.TopologicalMap:
 
 @given(topology=divided_maps(), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=examples(120), deadline=None, derandomize=True)
-def test_no_plan_crosses_a_shut_door_wherever_rooms_are(
-    topology: hn.TopologicalMap, seed: int
-) -> None:
+def test_no_plan_crosses_a_shut_door_wherever_rooms_are(topology, seed):
     grid, doors = topology.grid, topology.rooms.doors
     free = np.argwhere(grid.enterable())
     if not doors:
@@ -366,9 +356,7 @@ def test_two_closures_close_what_either_closes() -> None:
         (shapely.box(90, 90, 91, 91), "an area must meet the map, which spans x 0.00 to 7.50 m"),
     ],
 )
-def test_what_names_nothing_is_refused(
-    planners: dict[str, hn.HybridPlanner], preset: str, closed: Any, message: str
-) -> None:
+def test_what_names_nothing_is_refused(planners, preset, closed, message):
     planner = planners[preset]
     start, goal = planner.grid.frame.points_of([(9, 2), (9, 12)])
     asked = (
@@ -399,9 +387,7 @@ def test_a_door_of_another_map_is_refused() -> None:
             Blocked(doors=[other]).cells_of(topology)
 
 
-def test_what_is_closed_again_is_not_searched_for_again(
-    planners: dict[str, hn.HybridPlanner], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_closed_again_is_not_searched_for_again(planners, monkeypatch):
     planner = planners["shortest"]
     door = planner.topology.rooms.doors[0]
     area = shapely.box(1.0, 1.0, 1.4, 1.4)

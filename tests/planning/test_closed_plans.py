@@ -84,7 +84,7 @@ def check_blocked(
 
 @given(scene=scenes(max_side=18), corner_cutting=st.booleans())
 @PLAIN
-def test_closed_cells_are_as_good_as_occupied_ones(scene: Scene, corner_cutting: bool) -> None:  # noqa: FBT001
+def test_closed_cells_are_as_good_as_occupied_ones(scene: Scene, corner_cutting: bool) -> None:
     topology = scene_map(scene, corner_cutting=corner_cutting)
     grid, rng = topology.grid, np.random.default_rng(scene.seed)
     # Where corners may be cut the arcs of the places do not lead everywhere that paths do.
@@ -117,7 +117,7 @@ def test_closed_cells_are_as_good_as_occupied_ones(scene: Scene, corner_cutting:
 
 @given(scene=scenes(max_side=18), corner_cutting=st.booleans())
 @PLAIN
-def test_any_angle_paths_keep_off_what_is_closed(scene: Scene, corner_cutting: bool) -> None:  # noqa: FBT001
+def test_any_angle_paths_keep_off_what_is_closed(scene: Scene, corner_cutting: bool) -> None:
     topology = scene_map(scene, corner_cutting=corner_cutting)
     grid, rng = topology.grid, np.random.default_rng(scene.seed)
     planners = [hn.HybridPlanner(topology, preset=preset) for preset in ("octile", "grid-astar")]
@@ -203,9 +203,7 @@ def test_an_end_that_is_closed_is_named(preset: str) -> None:
 
 
 @presets
-def test_a_door_closed_by_a_polygon_sends_the_route_through_another(
-    office_planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_a_door_closed_by_a_polygon_sends_the_route_through_another(office_planners, preset):
     planner = office_planners[preset]
     topology, grid = planner.topology, planner.grid
     search, rerouted = GridSearch(grid.enterable()), 0
@@ -233,9 +231,7 @@ def test_a_door_closed_by_a_polygon_sends_the_route_through_another(
 
 
 @presets
-def test_a_closed_arc_is_not_passed(
-    office_planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_a_closed_arc_is_not_passed(office_planners, preset):
     planner = office_planners[preset]
     frame = planner.grid.frame
     detours = 0
@@ -254,9 +250,7 @@ def test_a_closed_arc_is_not_passed(
 
 
 @presets
-def test_what_is_closed_far_from_the_path_changes_nothing(
-    office_planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_what_is_closed_far_from_the_path_changes_nothing(office_planners, preset):
     planner = office_planners[preset]
     grid = planner.grid
     for pair in sample_pairs(grid, 8, seed=11):
@@ -289,9 +283,7 @@ def test_a_diagonal_past_a_closed_cell_is_not_taken(preset: str) -> None:
 
 @presets
 @pytest.mark.parametrize("blocked", [{"doors": [1]}, {"cells": [(0, 99)]}])
-def test_what_cannot_be_closed_is_refused_and_the_planner_goes_on(
-    preset: str, blocked: Any
-) -> None:
+def test_what_cannot_be_closed_is_refused_and_the_planner_goes_on(preset, blocked):
     planner = hn.HybridPlanner(map_of(grid_of(TWO_ROOMS)), preset=preset)
     start, goal = planner.grid.frame.points_of([(2, 2), (2, 12)])
     with pytest.raises(hn.errors.InvalidValueError) as caught:

@@ -87,11 +87,7 @@ def test_the_path_is_the_cheapest_with_gap_0(classes: Any, seed: int) -> None:
 
 @given(class_grids(max_side=24), seeds, st.booleans())
 @settings(max_examples=examples(100), deadline=None)
-def test_the_any_angle_finish_never_raises_the_cost(
-    classes: Any,
-    seed: int,
-    off_centre: bool,  # noqa: FBT001 - drawn
-) -> None:
+def test_the_any_angle_finish_never_raises_the_cost(classes, seed, off_centre):
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
     ends = grid.frame.points_of([start, goal])

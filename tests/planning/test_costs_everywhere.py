@@ -235,9 +235,7 @@ FUNCTIONS = (
 
 @pytest.mark.parametrize("preset", HONOUR)
 @pytest.mark.parametrize("function", FUNCTIONS)
-def test_each_function_plans_by_costs_as_scipy_does(
-    scene: Scene, function: Any, preset: str, tmp_path: Any
-) -> None:
+def test_each_function_plans_by_costs_as_scipy_does(scene, function, preset, tmp_path):
     function(scene, preset, tmp_path)
 
 
@@ -269,9 +267,7 @@ def pgm(scene: Scene, folder: Any) -> Any:
 
 
 @pytest.mark.parametrize("preset", HONOUR)
-def test_the_commands_plan_and_judge_by_costs(
-    scene: Scene, preset: str, cli: Any, tmp_path: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_commands_plan_and_judge_by_costs(scene, preset, cli, tmp_path, monkeypatch):
     monkeypatch.setattr("hybridnav.harness.run.run_local", run_here)
     path = pgm(scene, tmp_path)
     grid = hn.load_map(path, robot_radius_m=0)

@@ -101,7 +101,7 @@ def test_answers_depend_on_nothing_that_was_asked_before(name: str) -> None:
 
 @pytest.mark.parametrize("is_prepared", [False, True])
 @pytest.mark.parametrize("name", COUNTS)
-def test_an_update_and_its_reverse_change_nothing(name: str, is_prepared: bool) -> None:  # noqa: FBT001
+def test_an_update_and_its_reverse_change_nothing(name: str, is_prepared: bool) -> None:
     pairs, planner = queries(name)[:20], planner_of(name)
     cold = [told(planner, pair) for pair in pairs]
     if is_prepared:

@@ -66,11 +66,7 @@ def rooms() -> hn.TopologicalMap:
         pytest.param("PRMstar", True, marks=pytest.mark.full),
     ],
 )
-def test_every_planner_of_the_space_goes_through_doors_without_touching(
-    rooms: hn.TopologicalMap,
-    planner: str,
-    reverses: bool,  # noqa: FBT001
-) -> None:
+def test_every_planner_of_the_space_goes_through_doors_without_touching(rooms, planner, reverses):
     settings = f"planner={planner}", f"reverses={str(reverses).lower()}"
     start, goal = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)
     result = planner_of(rooms, *settings).plan(start, goal)

@@ -59,9 +59,7 @@ lines = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=8)
 
 @given(lines, st.floats(5, 500), st.booleans())
 @settings(max_examples=examples(80), deadline=None)
-def test_paths_survive_every_format(
-    tmp_path_factory: pytest.TempPathFactory, points: Any, spacing: float, faces: Any
-) -> None:
+def test_paths_survive_every_format(tmp_path_factory, points, spacing, faces):
     folder = tmp_path_factory.mktemp("path")
     headings: Any = np.linspace(0, 1, len(points)) if faces else None
     result = planned(points, headings)
@@ -140,9 +138,7 @@ def test_without_a_path_a_file_is_empty_and_sound(tmp_path: Path) -> None:
 
 @given(labelled(), st.sampled_from([0.05, 0.5]), st.floats(-3, 3))
 @settings(max_examples=examples(60), deadline=None)
-def test_rooms_survive_both_formats(
-    tmp_path_factory: pytest.TempPathFactory, drawn: Any, side: float, yaw: float
-) -> None:
+def test_rooms_survive_both_formats(tmp_path_factory, drawn, side, yaw):
     classes, labels = drawn
     few = [name for name in labels.names if (labels.label_of == labels.index(name)).any()]
     renamed = tuple(NAMES[i] if i < len(NAMES) else name for i, name in enumerate(few))
@@ -192,9 +188,7 @@ def test_rooms_survive_both_formats(
 
 @given(class_grids(14), st.floats(-3, 3), st.integers(1, 12))
 @settings(max_examples=examples(40), deadline=None)
-def test_places_survive_both_formats(
-    tmp_path_factory: pytest.TempPathFactory, classes: Any, yaw: float, first: int
-) -> None:
+def test_places_survive_both_formats(tmp_path_factory, classes, yaw, first):
     tmp_path = tmp_path_factory.mktemp("places")
     frame = hn.Frame(0.1, (3.0, 4.0), yaw)
     grid = hn.OccupancyGrid(occupancy_grid(classes).probability, frame, robot_radius_m=0)
@@ -240,9 +234,7 @@ TOPOLOGY = hn.TopologicalMap(hn.DualGraphPyramid.build(GRID))
 @pytest.mark.parametrize(
     ("export", "thing"), [(hn.export_path, planned([(0, 0), (1, 1)])), (hn.export_places, TOPOLOGY)]
 )
-def test_what_cannot_be_written_is_refused_in_one_line(
-    export: Any, thing: Any, tmp_path: Path
-) -> None:
+def test_what_cannot_be_written_is_refused_in_one_line(export, thing, tmp_path):
     for name, kind, words in (
         ("out.txt", hn.errors.MapError, r"must end in \.csv"),
         ("none/out.csv", hn.errors.MapError, "cannot write: No such file"),

@@ -116,9 +116,7 @@ def test_answers_of_octile_after_changes_are_those_of_a_planner_made_anew(seed: 
 @pytest.mark.parametrize("preset", REBUILT)
 @settings(max_examples=examples(8), deadline=None)
 @given(class_grids(max_side=16), SEEDS)
-def test_presets_on_places_follow_with_the_places_of_now(
-    preset: str, classes: Any, seed: int
-) -> None:
+def test_presets_on_places_follow_with_the_places_of_now(preset, classes, seed):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
     planner = hn.HybridPlanner(topology_of(grid), preset=preset)
@@ -220,9 +218,7 @@ def test_changes_outside_the_stated_area_are_refused(preset: str, kind: str) -> 
         ({"topology": "x"}, "topology is 'x' of type str, expected a TopologicalMap"),
     ],
 )
-def test_updates_by_nothing_or_by_other_things_are_refused(
-    given: dict[str, Any], message: str
-) -> None:
+def test_updates_by_nothing_or_by_other_things_are_refused(given, message):
     grid = hn.OccupancyGrid(np.zeros((6, 6), np.float32), robot_radius_m=0)
     planner = hn.HybridPlanner(topology_of(grid), preset="octile")
     with pytest.raises(hn.errors.InvalidValueError, match=message):
@@ -331,11 +327,7 @@ def factors_of(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.CostLayer
 @pytest.mark.parametrize("preset", ["robot", "paper", "grid-astar"])
 @settings(max_examples=examples(6), deadline=None)
 @given(SEEDS, st.booleans())
-def test_given_costs_stay_with_their_cells_on_a_changed_map(
-    preset: str,
-    seed: int,
-    prepared: bool,  # noqa: FBT001 - drawn
-) -> None:
+def test_given_costs_stay_with_their_cells_on_a_changed_map(preset, seed, prepared):
     """A planner that followed answers as one that is made of the map and the costs of now."""
     rng = np.random.default_rng(seed)
     blank = hn.OccupancyGrid(np.zeros((20, 30), np.float32), hn.Frame(0.1), robot_radius_m=0)
@@ -400,11 +392,7 @@ BAD_UPDATES: dict[str, tuple[dict[str, Any], str]] = {
 @pytest.mark.parametrize("bad", BAD_UPDATES)
 @pytest.mark.parametrize("preset", [*FOLLOWING, *REBUILT, "robot"])
 @pytest.mark.parametrize("is_prepared", [False, True])
-def test_a_refused_update_changes_nothing(
-    preset: str,
-    bad: str,
-    is_prepared: bool,  # noqa: FBT001 - of the table
-) -> None:
+def test_a_refused_update_changes_nothing(preset, bad, is_prepared):
     rng = np.random.default_rng(1)
     blank = hn.OccupancyGrid(np.zeros((20, 30), np.float32), hn.Frame(0.1), robot_radius_m=0)
     before = topology_of(with_speckles(blank, rng))

@@ -223,9 +223,7 @@ def test_a_result_says_which_of_the_three_answered(rooms: hn.OccupancyGrid, spac
 
 
 @pytest.mark.parametrize("space", ["differential", "se2", "dubins", "reeds-shepp"])
-def test_no_path_of_the_small_disc_is_a_proof_for_every_space(
-    rooms: hn.OccupancyGrid, space: str
-) -> None:
+def test_no_path_of_the_small_disc_is_a_proof_for_every_space(rooms, space):
     radius = ["turning_radius_m=0.8"] if space in {"dubins", "reeds-shepp"} else []
     made = planner_of(rooms, *radius, footprint=WIDE, space=space)
     result = made.plan((3.0, 3.0, 0.0), (17.0, 9.0, 0.0))
@@ -290,9 +288,7 @@ def test_padding_is_nav2s_for_a_rectangle_and_never_less_for_others() -> None:
         load_preset("ompl", overrides=["planner.ompl.footprint_padding_m=0.1"])
 
 
-def test_an_obstacle_of_one_query_holds_for_the_whole_robot_and_a_keepout_for_its_base(
-    rooms: hn.OccupancyGrid,
-) -> None:
+def test_an_obstacle_of_one_query_holds_for_the_whole_robot_and_a_keepout_for_its_base(rooms):
     made = planner_of(rooms)
     start, goal = (2.0, 2.0, 0.5), (4.5, 4.5, 2.0)
     pallet = shapely.box(2.9, 2.9, 3.6, 3.6)

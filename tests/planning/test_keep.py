@@ -139,9 +139,7 @@ def test_a_kept_path_does_not_bend_between_cells_that_meet_at_a_corner() -> None
 
 @given(class_grids(max_side=16), seeds, st.sampled_from(["shortest", "octile"]))
 @settings(max_examples=examples(80), deadline=None)
-def test_shortest_paths_are_kept_while_they_are_legal_and_hardly_longer(
-    classes: Any, seed: int, preset: str
-) -> None:
+def test_shortest_paths_are_kept_while_they_are_legal_and_hardly_longer(classes, seed, preset):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
     planner = hn.HybridPlanner(topology_of(grid), preset=preset)

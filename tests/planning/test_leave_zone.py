@@ -42,9 +42,7 @@ def lengths(is_open: Any, start: tuple[int, int]) -> Any:
     st.integers(0, 2**32 - 1),
 )
 @settings(max_examples=examples(80), deadline=None)
-def test_it_leaves_by_the_shortest_way_and_goes_on_by_the_best_path(
-    classes: Any, preset: str, seed: int
-) -> None:
+def test_it_leaves_by_the_shortest_way_and_goes_on_by_the_best_path(classes, preset, seed):
     rng = np.random.default_rng(seed)
     probability = np.array([0.0, 1.0, 0.5])[np.searchsorted([0, 1, 2], classes)]
     grid = hn.OccupancyGrid(probability, frame=FRAME)

@@ -50,7 +50,7 @@ def check_smooth(planner: hn.HybridPlanner, start: Any, goal: Any) -> hn.PlanRes
 
 @given(scene=scenes(max_side=16), at_centres=st.booleans())
 @PLAIN
-def test_an_any_angle_path_is_legal_and_its_bound_holds(scene: Scene, at_centres: bool) -> None:  # noqa: FBT001
+def test_an_any_angle_path_is_legal_and_its_bound_holds(scene: Scene, at_centres: bool) -> None:
     topology = scene_map(scene)
     grid = topology.grid
     graph = VisibilityGraph(grid)
@@ -68,9 +68,7 @@ def test_an_any_angle_path_is_legal_and_its_bound_holds(scene: Scene, at_centres
 
 
 @presets
-def test_any_angle_paths_of_the_office(
-    office_planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_any_angle_paths_of_the_office(office_planners, preset):
     planner = office_planners[preset]
     grid = planner.grid
     pairs = points_in(grid, np.random.default_rng(4), 40)
@@ -81,9 +79,7 @@ def test_any_angle_paths_of_the_office(
 
 
 @presets
-def test_the_presets_own_smooth_and_the_argument_agree(
-    office: hn.TopologicalMap, preset: str
-) -> None:
+def test_the_presets_own_smooth_and_the_argument_agree(office, preset):
     smoothing = hn.load_preset(preset, overrides=["planner.smooth=line-of-sight"])
     by_setting = hn.HybridPlanner(office, preset=smoothing)
     by_argument = hn.HybridPlanner(office, preset=preset)

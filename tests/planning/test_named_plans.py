@@ -198,11 +198,7 @@ def test_a_footprint_fits_at_the_stops_chosen_for_it(driving, half_m):
     walls = shapely.union_all(shapely.box(*low.T, *(low + SIDE).T))
     for start, goal in (("kitchen", "hall"), ("hall", "lab")):
         clear = []
-        for name, pose in zip(
-            (start, goal),
-            stops_of(planner, [start, goal]),
-            strict=True,
-        ):
+        for name, pose in zip((start, goal), stops_of(planner, [start, goal]), strict=True):
             cells = np.argwhere((CLASSES == 1) & (rooms.labels.label_of == NAMES.index(name)))
             room = shapely.points(points_of(cells))
             fits = room[shapely.distance(room, walls) >= math.hypot(half_m, 0.15)]

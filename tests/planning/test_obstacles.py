@@ -59,9 +59,7 @@ def by_file(kind: str, folder: Path, grid: hn.OccupancyGrid) -> Path:
 
 @pytest.mark.parametrize("kind", ["geojson", "png", "yaml"])
 @pytest.mark.parametrize("preset", ["shortest", "octile", "grid-astar", "paper"])
-def test_closed_areas_of_files_are_obstacles_unless_they_are_keepout(
-    hall: hn.TopologicalMap, kind: str, preset: str, tmp_path: Path
-) -> None:
+def test_closed_areas_of_files_are_obstacles_unless_they_are_keepout(hall, kind, preset, tmp_path):
     path = by_file(kind, tmp_path, hall.grid)
     planner = hn.HybridPlanner(hall, preset=preset)
     pallet = planner.plan(START, GOAL, blocked=hn.load_blocked(path, hall.grid))
@@ -86,9 +84,7 @@ def test_areas_say_in_python_which_they_are(hall: hn.TopologicalMap) -> None:
 
 @pytest.mark.parametrize("preset", BY_COSTS)
 @pytest.mark.parametrize("by_update", [False, True])
-def test_closed_cells_of_costs_are_obstacles_unless_they_are_keepout(
-    hall: hn.TopologicalMap, preset: str, *, by_update: bool
-) -> None:
+def test_closed_cells_of_costs_are_obstacles_unless_they_are_keepout(hall, preset, *, by_update):
     """Given at once, or by an update of the area of the pallet alone."""
     cells, plain = pallet_cells(hall.grid), np.ones(hall.grid.shape, np.float32)
     for obstacle in (True, False):

@@ -54,7 +54,7 @@ def assert_same(found: hn.PlanResult, expected: hn.PlanResult, enterable: Any) -
 
 @settings(max_examples=examples(40), deadline=None)
 @given(class_grids(), st.booleans(), st.integers(0, 2**32 - 1))
-def test_it_answers_what_the_whole_grid_answers(classes: Any, unexplored: bool, seed: int) -> None:  # noqa: FBT001
+def test_it_answers_what_the_whole_grid_answers(classes: Any, unexplored: bool, seed: int) -> None:
     grid = occupancy_grid(classes)
     assume((classes != 0).any())
     octile, whole = both(topology_of(grid), f"planner.allow_unexplored={str(unexplored).lower()}")

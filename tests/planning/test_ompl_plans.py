@@ -151,9 +151,7 @@ def test_equal_seeds_give_equal_paths_when_iterations_are_counted(planner_of: An
         assert first.shape != other.shape or not np.array_equal(first, other)
 
 
-def test_the_whole_map_and_the_places_are_corridors_too(
-    office: hn.TopologicalMap,
-) -> None:
+def test_the_whole_map_and_the_places_are_corridors_too(office):
     for coarse in ("grid-astar", "paper"):
         preset = load_preset("ompl", overrides=[f"planner.along={coarse}"])
         result = hn.HybridPlanner(office, preset=preset).plan(*ENDS)
@@ -196,9 +194,7 @@ def test_closed_cells_are_gone_round(planner_of: Any) -> None:
         pytest.param("reeds-shepp", "PRMstar", marks=pytest.mark.full),
     ],
 )
-def test_a_long_robot_goes_through_doors_without_touching(
-    rooms: hn.TopologicalMap, space: str, planner: str
-) -> None:
+def test_a_long_robot_goes_through_doors_without_touching(rooms, space, planner):
     made = long_robot(rooms, space, f"planner: {planner}, budget_s: 4")
     start, goal = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)
     result = made.plan(start, goal)
@@ -266,8 +262,7 @@ def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMa
     """A robot 1 m wide fits into the rooms and through no door; a disc inside it does."""
     wide = "[[0.5, 0.3], [-0.5, 0.3], [-0.5, -0.7], [0.5, -0.7]]"
     preset = load_preset(
-        "ompl",
-        overrides=[f"planner.ompl={{space: se2, footprint: '{wide}', budget_s: 0.4}}"],
+        "ompl", overrides=[f"planner.ompl={{space: se2, footprint: '{wide}', budget_s: 0.4}}"]
     )
     result = hn.HybridPlanner(rooms, preset=preset).plan((3.0, 3.0, 0.0), (17.0, 9.0, 0.0))
     assert result.status in {hn.PlanStatus.APPROXIMATE, hn.PlanStatus.TIMEOUT}
@@ -331,9 +326,7 @@ except hn.errors.OmplError as error:
 
 
 @pytest.mark.full
-def test_two_thousand_plans_leak_and_hang_nowhere(
-    planner_of: Any, office: hn.TopologicalMap
-) -> None:
+def test_two_thousand_plans_leak_and_hang_nowhere(planner_of, office):
     made = planner_of("ompl", "budget_s=0.25")
     pids = (os.getpid(), made._now.ompl._worker._running.process.pid)
     rng = np.random.default_rng(0)
@@ -412,9 +405,7 @@ def test_a_heading_of_half_a_turn_is_a_heading_like_others(rooms: hn.Topological
         ),
     ],
 )
-def test_cost_and_bound_of_short_curves_are_those_of_their_points(
-    space: str, start: Any, goal: Any, length_m: float
-) -> None:
+def test_cost_and_bound_of_short_curves_are_those_of_their_points(space, start, goal, length_m):
     origin_m = (math.floor(start[0]) - 10, math.floor(start[1]) - 10)
     empty = hn.OccupancyGrid(np.zeros((40, 40), np.float32), hn.Frame(0.5, origin_m=origin_m))
     overrides = [f"planner.ompl.space={space}", "planner.ompl.turning_radius_m=1.0"]

@@ -136,9 +136,7 @@ def test_a_changed_map_makes_the_method_anew() -> None:
         ("NeedsMore", "it makes no method of the map, TypeError: "),
     ],
 )
-def test_a_class_that_is_no_method_is_refused_when_a_planner_is_made(
-    topology: hn.TopologicalMap, name: str, message: str
-) -> None:
+def test_a_class_that_is_no_method_is_refused_when_a_planner_is_made(topology, name, message):
     with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, name)
     assert str(caught.value).startswith(f"planner.method: mine:{name}: {message}")
@@ -152,9 +150,7 @@ def test_a_class_that_is_no_method_is_refused_when_a_planner_is_made(
         (Found(np.array([[0, 0], [1, 1]]), 1.0, 1.0), "a path from (0, 0) to (1, 1)"),
     ],
 )
-def test_an_answer_that_is_none_is_refused(
-    topology: hn.TopologicalMap, answer: Any, shown: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_answer_that_is_none_is_refused(topology, answer, shown, monkeypatch):
     monkeypatch.setattr(Faulty, "answer", answer)
     with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, "Faulty").plan(START, GOAL)
@@ -162,9 +158,7 @@ def test_an_answer_that_is_none_is_refused(
 
 
 @pytest.mark.parametrize("metric", ["octile", "any-angle"])
-def test_a_path_without_a_bound_is_not_called_optimal(
-    topology: hn.TopologicalMap, metric: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_path_without_a_bound_is_not_called_optimal(topology, metric, monkeypatch):
     found = hn.HybridPlanner(topology, preset="grid-astar").plan(START, GOAL)
     assert found.path is not None
     length_m = found.path.length_m
@@ -189,9 +183,7 @@ def test_costs_do_not_go_with_a_method_that_is_not_known(topology: hn.Topologica
         hn.HybridPlanner(topology, preset=preset, costs=layer)
 
 
-def test_a_path_at_any_angle_through_closed_cells_is_refused(
-    topology: hn.TopologicalMap, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_path_at_any_angle_through_closed_cells_is_refused(topology, monkeypatch):
     monkeypatch.setattr(ByCells, "metric", "any-angle")
     planner = planner_of(topology, "ByCells")
     path = planner.plan(START, GOAL).path

@@ -140,9 +140,7 @@ def test_a_class_that_finds_nothing_proves_nothing(topology: TopologicalMap, coa
         ),
     ],
 )
-def test_a_class_that_cannot_be_used_is_refused_in_one_line(
-    topology: TopologicalMap, write: Write, code: str, name: str, words: str
-) -> None:
+def test_a_class_that_cannot_be_used_is_refused_in_one_line(topology, write, code, name, words):
     write("mine", code)
     with pytest.raises(hn.errors.PresetError) as caught:
         planner_of(topology, name)
@@ -168,9 +166,7 @@ def test_a_class_that_cannot_be_used_is_refused_in_one_line(
         ("([start, (-1, 0), start, goal], 1)", "a path with a move that is not legal"),
     ],
 )
-def test_an_answer_that_is_no_path_is_refused_in_one_line(
-    topology: TopologicalMap, write: Write, answer: str, words: str
-) -> None:
+def test_an_answer_that_is_no_path_is_refused_in_one_line(topology, write, answer, words):
     write("faulty", FAULTS.format(answer=answer))
     planner = planner_of(topology, "faulty:Faulty")
     with pytest.raises(hn.errors.PresetError) as caught:

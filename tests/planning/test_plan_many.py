@@ -16,9 +16,7 @@ from tests.plans import PRESETS, TWO_ROOMS, grid_of, map_of, points_in, presets
 
 @presets
 @pytest.mark.parametrize("smooth", [None, "line-of-sight"])
-def test_many_answers_are_the_answers_one_by_one(
-    office_planners: dict[str, hn.HybridPlanner], preset: str, smooth: Any
-) -> None:
+def test_many_answers_are_the_answers_one_by_one(office_planners, preset, smooth):
     planner = office_planners[preset]
     grid = planner.grid
     rng = np.random.default_rng(6)
@@ -67,9 +65,7 @@ def test_a_path_from_a_point_to_itself_is_that_point_alone(preset: str) -> None:
 
 
 @presets
-def test_many_takes_lists_and_nothing_at_all(
-    office_planners: dict[str, hn.HybridPlanner], preset: str
-) -> None:
+def test_many_takes_lists_and_nothing_at_all(office_planners, preset):
     planner = office_planners[preset]
     (start, goal), *_ = points_in(planner.grid, np.random.default_rng(7), 1)
     one = planner.plan_many([start.tolist()], [tuple(goal)])
@@ -99,17 +95,13 @@ def test_many_takes_lists_and_nothing_at_all(
         (None, None, "starts must be finite coordinates"),
     ],
 )
-def test_many_refuses_what_are_no_points(
-    office_planners: dict[str, hn.HybridPlanner], starts: Any, goals: Any, message: str
-) -> None:
+def test_many_refuses_what_are_no_points(office_planners, starts, goals, message):
     with pytest.raises(hn.errors.InvalidValueError, match=message) as caught:
         office_planners["octile"].plan_many(starts, goals)
     assert str(caught.value).isprintable()
 
 
-def test_bounds_that_take_a_search_are_found_when_they_are_read(
-    office_planners: dict[str, hn.HybridPlanner], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bounds_that_take_a_search_are_found_when_they_are_read(office_planners, monkeypatch):
     planner = hn.HybridPlanner(office_planners["octile"].topology, preset="robot")
     pairs = points_in(planner.grid, np.random.default_rng(2), 6)
     bound, read = CostFinish.bound, []
@@ -134,9 +126,7 @@ def test_bounds_that_take_a_search_are_found_when_they_are_read(
 
 
 @pytest.mark.parametrize("preset", ["octile", "shortest", "grid-astar"])
-def test_costs_that_are_not_the_length_of_their_points_are_refused(
-    monkeypatch: pytest.MonkeyPatch, preset: str
-) -> None:
+def test_costs_that_are_not_the_length_of_their_points_are_refused(monkeypatch, preset):
     grid = grid_of(np.ones((6, 9)))
     planner = hn.HybridPlanner(map_of(grid), preset=preset)
     points, method = grid.frame.points_of(np.array([[0, 0], [2, 6]])), planner.method

@@ -20,7 +20,7 @@ import hybridnav as hn
 from hybridnav.maps import CellClass
 from tests.oracle.corridors import corridor_of
 from tests.oracle.grid import assert_legal, centre, components, distances, move_graph, recounted
-from tests.strategies import Scene, drawn, examples, occupancy_grid, scenes
+from tests.strategies import drawn, examples, occupancy_grid, scenes
 
 MAPS = Path(__file__).parents[2] / "maps"
 OPEN = drawn(*["." * 9] * 6)
@@ -63,9 +63,7 @@ presets = pytest.mark.parametrize("preset", ["paper", "grid-astar"])
         ((0.0, 0.0), (8.999, 4.999), "solved"),
     ],
 )
-def test_an_end_that_cannot_be_planned_from_is_named(
-    preset: str, start: tuple[float, float], goal: tuple[float, float], status: str
-) -> None:
+def test_an_end_that_cannot_be_planned_from_is_named(preset, start, goal, status):
     result = hn.HybridPlanner(map_of(SEALED, merge_distance_m=3.0), preset=preset).plan(start, goal)
     assert result.status == hn.PlanStatus(status)
     if status == "solved":
@@ -206,9 +204,7 @@ def test_gap_of_a_corridor_is_that_to_the_best_path_of_the_whole_map() -> None:
 
 @given(scenes(max_side=16), st.integers(0, 2**32 - 1), st.sampled_from(["true", "false"]))
 @settings(max_examples=examples(50))
-def test_routes_paths_and_bounds_are_right_on_random_maps(
-    scene: Scene, seed: int, allow_unexplored: str
-) -> None:
+def test_routes_paths_and_bounds_are_right_on_random_maps(scene, seed, allow_unexplored):
     grid = scene.grid
     enterable = grid.classes == CellClass.FREE
     if allow_unexplored == "true":
@@ -327,9 +323,7 @@ def office() -> hn.TopologicalMap:
     return map_of(hn.load_map(MAPS / "office" / "office.yaml", robot_radius_m=0.25))
 
 
-def test_in_the_office_a_wider_corridor_is_never_longer_and_the_grid_is_shortest(
-    office: hn.TopologicalMap,
-) -> None:
+def test_in_the_office_a_wider_corridor_is_never_longer_and_the_grid_is_shortest(office):
     grid = office.grid
     near = hn.load_preset("paper", overrides=["planner.corridor=neighbours"])
     planners = [hn.HybridPlanner(office, preset=preset) for preset in ("grid-astar", near, "paper")]
@@ -397,9 +391,7 @@ def test_a_result_records_how_the_pyramid_was_built_and_not_what_the_preset_says
 @pytest.mark.parametrize(
     ("preset", "seconds"), [("paper", {"descent"}), ("grid-astar", {"refine"})]
 )
-def test_a_result_is_json(
-    build: dict[str, Any], goal: tuple[float, float], preset: str, seconds: set[str]
-) -> None:
+def test_a_result_is_json(build, goal, preset, seconds):
     result = hn.HybridPlanner(map_of(SEALED, **build), preset=preset).plan((0.5, 0.5), goal)
     # Neither NaN nor Infinity: they are no JSON, and strict readers refuse them.
     read = json.loads(json.dumps(result.to_dict(), allow_nan=False))

@@ -69,9 +69,7 @@ def two_rooms() -> hn.TopologicalMap:
 
 
 @pytest.mark.parametrize("preset", [*PLAIN, *OMPL])
-def test_every_preset_starts_and_ends_with_the_yaw_asked_for(
-    two_rooms: hn.TopologicalMap, preset: str, tmp_path: Path
-) -> None:
+def test_every_preset_starts_and_ends_with_the_yaw_asked_for(two_rooms, preset, tmp_path):
     planner = planner_of(two_rooms, preset)
     centres = two_rooms.grid.frame.points_of([(7, 1), (1, 13)]).tolist()
     start, goal = (*centres[0], START_YAW), (*centres[1], GOAL_YAW)
@@ -98,9 +96,7 @@ def test_every_preset_starts_and_ends_with_the_yaw_asked_for(
 
 @pytest.mark.parametrize("preset", PLAIN)
 @pytest.mark.parametrize("smooth", SMOOTH)
-def test_a_yaw_at_one_end_or_without_a_way_is_kept(
-    two_rooms: hn.TopologicalMap, preset: str, smooth: Any
-) -> None:
+def test_a_yaw_at_one_end_or_without_a_way_is_kept(two_rooms, preset, smooth):
     if smooth == "arcs" and preset != "robot":
         return  # arcs are for costs
     planner = hn.HybridPlanner(two_rooms, preset=preset)
@@ -127,9 +123,7 @@ def test_a_yaw_at_one_end_or_without_a_way_is_kept(
 
 @pytest.mark.parametrize("preset", PLAIN)
 @pytest.mark.parametrize("yaw", [math.nan, math.inf, "east", None])
-def test_a_yaw_that_is_no_number_is_refused(
-    two_rooms: hn.TopologicalMap, preset: str, yaw: Any
-) -> None:
+def test_a_yaw_that_is_no_number_is_refused(two_rooms, preset, yaw):
     planner = hn.HybridPlanner(two_rooms, preset=preset)
     one, other = two_rooms.grid.frame.points_of([(7, 1), (1, 13)]).tolist()
     with pytest.raises(
@@ -196,9 +190,7 @@ def office() -> hn.TopologicalMap:
 
 
 @pytest.mark.parametrize("preset", PLAIN)
-def test_no_pose_occurs_twice_in_the_office(
-    office: hn.TopologicalMap, preset: str, tmp_path: Path
-) -> None:
+def test_no_pose_occurs_twice_in_the_office(office, preset, tmp_path):
     planner = hn.HybridPlanner(office, preset=preset)
     arcs = 0
     for number, (one, other) in enumerate(points_in(office.grid, np.random.default_rng(3), 12)):
@@ -217,9 +209,7 @@ def test_no_pose_occurs_twice_in_the_office(
     assert (arcs > 5) == (preset == "robot")
 
 
-def test_no_pose_occurs_twice_where_the_plans_of_a_tour_meet(
-    two_rooms: hn.TopologicalMap, tmp_path: Path
-) -> None:
+def test_no_pose_occurs_twice_where_the_plans_of_a_tour_meet(two_rooms, tmp_path):
     """Straight on over a waypoint, back from one, and on from one with the yaw of both plans."""
     planner = hn.HybridPlanner(two_rooms)
     a, b, c = two_rooms.grid.frame.points_of([(1, 1), (1, 3), (1, 5)]).tolist()
@@ -250,9 +240,7 @@ def spots_of_pure_pursuit(poses: Any) -> set[int]:
 
 @pytest.mark.parametrize("preset", [*PLAIN, *OMPL])
 @pytest.mark.parametrize("yaws", [(), (START_YAW, GOAL_YAW)])
-def test_messages_are_as_the_controllers_of_nav2_take_them(
-    two_rooms: hn.TopologicalMap, preset: str, yaws: Any
-) -> None:
+def test_messages_are_as_the_controllers_of_nav2_take_them(two_rooms, preset, yaws):
     if preset in NEEDS_YAW and not yaws:
         return
     planner = planner_of(two_rooms, preset)
@@ -284,9 +272,7 @@ def test_messages_are_as_the_controllers_of_nav2_take_them(
 
 
 @pytest.mark.parametrize("preset", PLAIN)
-def test_a_message_from_a_point_to_itself_has_a_pose(
-    two_rooms: hn.TopologicalMap, preset: str
-) -> None:
+def test_a_message_from_a_point_to_itself_has_a_pose(two_rooms, preset):
     planner = hn.HybridPlanner(two_rooms, preset=preset)
     (point,) = two_rooms.grid.frame.points_of([(7, 1)]).tolist()
     path: Any = planner.plan(point, point).path

@@ -72,14 +72,7 @@ def drawn(ink: tuple[str, ...]) -> hn.HybridPlanner:
 
 def test_a_way_through_the_second_part_of_an_own_room_opens_no_other_private_room() -> None:
     """From the left part of A: through hall h and the right part of A to k. B is the shortcut."""
-    ink = (
-        "##########",
-        "#AABBBkkk#",
-        "#AA####kk#",
-        "#hh####kk#",
-        "#hhhhAAkk#",
-        "##########",
-    )
+    ink = ("##########", "#AABBBkkk#", "#AA####kk#", "#hh####kk#", "#hhhhAAkk#", "##########")
     start, goal = (0.75, 2.25), (4.25, 1.25)
     for pair in ((start, goal), (goal, start)):
         visitor = hn.under(drawn(ink), "visitor")

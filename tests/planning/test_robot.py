@@ -75,12 +75,7 @@ def check(grid: hn.OccupancyGrid, is_open: Any, path: hn.Path, radius_m: float) 
 
 @given(class_grids(max_side=24), seeds, st.booleans(), st.sampled_from([0.1, 0.5, 2.0]))
 @settings(max_examples=examples(100), deadline=None)
-def test_arcs_stay_in_free_space_and_near_the_cost_of_the_line(
-    classes: Any,
-    seed: int,
-    off_centre: bool,  # noqa: FBT001 - drawn
-    radius_m: float,
-) -> None:
+def test_arcs_stay_in_free_space_and_near_the_cost_of_the_line(classes, seed, off_centre, radius_m):
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
     preset = hn.load_preset("grid-astar", overrides=[f"planner.turning_radius_m={radius_m}"])
     planner = hn.HybridPlanner(topology_of(grid), preset=preset, costs=layer)

@@ -77,9 +77,7 @@ def test_the_reference_data_lists_43_maps(data: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ros_maps())
-def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(
-    data: Path, name: str
-) -> None:
+def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(data, name):
     site = KnownMap.of(data / name)
     grid = site.topology.grid
     assert np.array_equal(grid.classes == CellClass.FREE, site.enterable)

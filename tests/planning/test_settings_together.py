@@ -43,9 +43,7 @@ import hybridnav as hn
         ),
     ],
 )
-def test_settings_that_do_not_go_together_are_refused(
-    preset: str, override: str, message: str
-) -> None:
+def test_settings_that_do_not_go_together_are_refused(preset, override, message):
     with pytest.raises(hn.errors.PresetError) as caught:
         hn.load_preset(preset, overrides=[override])
     assert message in str(caught.value)

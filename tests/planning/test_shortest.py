@@ -6,7 +6,6 @@ import math
 import time
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,11 +73,7 @@ def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn
 
 @settings(max_examples=examples(50), deadline=None)
 @given(class_grids(max_side=14), seeds, st.booleans())
-def test_paths_round_closed_cells_are_optimal(
-    classes: Any,
-    seed: int,
-    is_prepared: bool,  # noqa: FBT001
-) -> None:
+def test_paths_round_closed_cells_are_optimal(classes, seed, is_prepared):
     cells = np.argwhere(classes == hn.CellClass.FREE)
     assume(len(cells) > 4)
     rng = np.random.default_rng(seed)
@@ -170,9 +165,7 @@ def test_smoothing_changes_nothing() -> None:
 
 @settings(max_examples=examples(30), deadline=None)
 @given(class_grids(max_side=14), seeds, st.sampled_from([0.0, 0.01, 0.3]))
-def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(
-    classes: Any, seed: int, epsilon: float
-) -> None:
+def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(classes, seed, epsilon):
     cells = np.argwhere(classes == hn.CellClass.FREE)
     assume(len(cells))
     topology = mapped(classes)
@@ -218,9 +211,7 @@ def test_a_query_whose_time_is_up_has_a_path_and_a_bound() -> None:
         ("octile", "planning.methods.octile.build_jump_graph"),
     ],
 )
-def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(
-    preset: str, built: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(preset, built, monkeypatch):
     home, _, name = built.rpartition(".")
     module, calls = importlib.import_module(f"hybridnav.{home}"), []
     build = getattr(module, name)
@@ -282,9 +273,7 @@ def test_preparing_reports_every_step_and_nothing_that_is_done_already(preset: s
 
 
 @pytest.mark.filterwarnings("default:the map has")
-def test_a_large_mesh_is_announced_before_it_is_built(
-    monkeypatch: pytest.MonkeyPatch, cli: Any, tmp_path: Path
-) -> None:
+def test_a_large_mesh_is_announced_before_it_is_built(monkeypatch, cli, tmp_path):
     free = np.ones((40, 50), dtype=bool)
     free[1:-1:3, 1:-1:3] = False
     grid = hn.OccupancyGrid(np.where(free, 0, 1).astype(np.float32), robot_radius_m=0)

@@ -116,9 +116,7 @@ def test_no_linear_program_finds_a_faster_profile(pieces: Any, limits: MotionLim
 
 @given(pieces=PIECES, limits=LIMITS, spacing_m=st.floats(0.03, 2.0))
 @settings(max_examples=examples(60), deadline=None)
-def test_no_limit_is_violated_and_the_spacing_changes_no_time(
-    pieces: Any, limits: MotionLimits, spacing_m: float
-) -> None:
+def test_no_limit_is_violated_and_the_spacing_changes_no_time(pieces, limits, spacing_m):
     path = tangent_path(pieces)
     profile = path.profile(limits, spacing_m)
     speed, time_s = profile.speed_m_s, profile.time_s
@@ -152,9 +150,7 @@ def test_no_limit_is_violated_and_the_spacing_changes_no_time(
 
 @given(pieces=PIECES, limits=LIMITS, more=st.floats(1.0, 3.0))
 @settings(max_examples=examples(60), deadline=None)
-def test_higher_limits_are_never_slower_and_time_scales(
-    pieces: Any, limits: MotionLimits, more: float
-) -> None:
+def test_higher_limits_are_never_slower_and_time_scales(pieces, limits, more):
     path = tangent_path(pieces)
     seconds = path.profile(limits).duration_s
     for each in fields(limits):

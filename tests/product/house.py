@@ -12,6 +12,7 @@ import sys
 import tokenize
 from collections import Counter
 from dataclasses import dataclass
+from functools import cache
 from io import StringIO
 from pathlib import Path
 
@@ -25,6 +26,12 @@ _NO_CODE = {
     tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
     tokenize.ENDMARKER,
 }  # fmt: skip
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    """Read a file once for all that is counted."""
+    return ast.parse(path.read_text())
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class Source:
 
 def read(path: Path, root: Path = SRC) -> Source:
     text = path.read_text()
-    tree = ast.parse(text)
+    tree = _tree(path)
     prose: set[int] = set()
     importing: set[int] = set()
     names: set[str] = set()
@@ -126,6 +133,7 @@ def _told(script: str, *arguments: str, **environment: str) -> list[str]:
     return names
 
 
+@cache
 def visited_by_paper() -> list[Path]:
     """Return the files in which a function runs from a map's file to a path by `paper`.
 
@@ -147,7 +155,7 @@ def bare_kernels() -> list[str]:
         tokens = list(tokenize.generate_tokens(StringIO(text).readline))
         comments = {one.start[0] for one in tokens if one.type == tokenize.COMMENT}
         written = {one.start[0] for one in tokens if one.type not in _NO_CODE}
-        for node in ast.walk(ast.parse(text)):
+        for node in ast.walk(_tree(path)):
             if isinstance(node, ast.FunctionDef) and node.end_lineno is not None:
                 first = node.body[0].end_lineno if ast.get_docstring(node) else node.lineno
                 body = set(range((first or 0) + 1, node.end_lineno + 1))
@@ -176,7 +184,7 @@ def floors_of(package: Path) -> int:
     """
     graph: nx.DiGraph[Path] = nx.DiGraph()
     for path in package.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(_tree(path)):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hybridnav."):
                 for alias in node.names:
                     other = _home(node.module or "", alias.name)
@@ -192,7 +200,7 @@ def _home(module: str, name: str) -> Path:
         return place / f"{name}.py"
     stub = place / "__init__.pyi"
     if stub.exists():
-        for node in ast.walk(ast.parse(stub.read_text())):
+        for node in ast.walk(_tree(stub)):
             if isinstance(node, ast.ImportFrom) and any(one.name == name for one in node.names):
                 return _home(".".join([module, *filter(None, [node.module])]), name)
     return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
@@ -203,12 +211,12 @@ def unnamed() -> list[str]:
     words in a name begins a word there."""
     missing = []
     for stub in SRC.rglob("*.pyi"):
-        for node in ast.walk(ast.parse(stub.read_text())):
+        for node in ast.walk(_tree(stub)):
             if not isinstance(node, ast.ImportFrom) or node.level != 1 or not node.module:
                 continue
             path = stub.parent / f"{node.module.replace('.', '/')}.py"
             if path.exists():
-                head = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n\n")[0]
+                head = (ast.get_docstring(_tree(path)) or "").partition("\n\n")[0]
                 missing += [
                     f"{path.relative_to(SRC)}: {alias.name}"
                     for alias in node.names
@@ -223,18 +231,19 @@ def _is_named(name: str, head: str) -> bool:
     return name in head or any(begin in head.lower() for begin in begins)
 
 
-def functions_with(name: str) -> int:
-    """Return how many functions name a value or a parameter so, those inside them apart."""
-    count = 0
+@cache
+def _names_of_functions() -> Counter[str]:
+    """Count the functions that name a value or a parameter so, those inside them apart."""
+    count: Counter[str] = Counter()
     for path in SRC.rglob("*.py"):
-        for function in ast.walk(ast.parse(path.read_text())):
-            waiting = [*ast.iter_child_nodes(function)] if _is_function(function) else []
+        for function in filter(_is_function, ast.walk(_tree(path))):
+            waiting = [*ast.iter_child_nodes(function)]
             names = set()
             for node in waiting:
                 if not _is_function(node):
                     names.add(getattr(node, "id", getattr(node, "arg", None)))
                     waiting += ast.iter_child_nodes(node)
-            count += name in names
+            count.update(filter(None, names))
     return count
 
 
@@ -272,8 +281,8 @@ def figures(target: Path) -> dict[str, float]:
             len(re.findall(r"\b(?:Option|Argument|option)\(", path.read_text()))
             for path in SRC.rglob("*.py")
         ),
-        "functions with a value called found": functions_with("found"),
-        "functions with a value called known": functions_with("known"),
+        "functions with a value called found": _names_of_functions()["found"],
+        "functions with a value called known": _names_of_functions()["known"],
         "lines of tests": sum(one.lines for one in sources(ROOT / "tests")),
     }
 

@@ -41,11 +41,7 @@ def restored(data: bytes) -> Any:
 
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 QUICK = [name for name in hn.preset_names() if name != "ompl"]
-WAYS = pytest.mark.parametrize(
-    "copied",
-    [pickled, copy.deepcopy],
-    ids=["pickle", "deep"],
-)
+WAYS = pytest.mark.parametrize("copied", [pickled, copy.deepcopy], ids=["pickle", "deep"])
 
 
 @cache
@@ -103,10 +99,7 @@ def followed(grid: hn.OccupancyGrid) -> dict[str, Any]:
     probability[5:8, 5:14] = 1.0
     update = places.update(replace(grid, probability=probability))
     now = update.version.pyramid.grid  # levels are found lazily
-    return {
-        "places": update,
-        "rooms update": rooms.update(now),
-    }
+    return {"places": update, "rooms update": rooms.update(now)}
 
 
 @WAYS
@@ -189,9 +182,7 @@ def test_a_shallow_copy_of_a_copy_works_too(copied: Any) -> None:
 
 @WAYS
 @pytest.mark.parametrize("preset", QUICK)
-def test_a_copied_planner_answers_alike_without_compiling_anything(
-    preset: str, copied: Any
-) -> None:
+def test_a_copied_planner_answers_alike_without_compiling_anything(preset, copied):
     original = planner(preset)
     room = topology().rooms.names[0]
 

@@ -108,9 +108,7 @@ def test_the_site_lists_every_notebook() -> None:
     assert listed == [(path.stem[:2], path.stem) for path in NOTEBOOKS]
 
 
-def test_executed_notebooks_are_kept_until_the_code_changes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_executed_notebooks_are_kept_until_the_code_changes(tmp_path, monkeypatch):
     monkeypatch.setattr(notebook_pages, "ROOT", tmp_path)
     monkeypatch.setattr(notebook_pages, "CACHES", tmp_path / "out")
     code = tmp_path / "src" / "package" / "code.py"
@@ -154,12 +152,10 @@ def behaviour() -> dict[str, str]:
                 "| a lattice of cheap lines over the cells": "read off the path",
                 "| the cells of the whole grid |": "read off the path",
             },
-        ),
+        )
     ],
 )
-def test_pages_describe_the_flow_of_data_preset_by_preset(
-    page: str, words: dict[str, str], behaviour: dict[str, str]
-) -> None:
+def test_pages_describe_the_flow_of_data_preset_by_preset(page, words, behaviour):
     lines = (ROOT / page).read_text(encoding="utf-8").splitlines()
     described: dict[str, str] = {}
     for mark, source in words.items():

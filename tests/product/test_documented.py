@@ -95,9 +95,7 @@ def _public_functions() -> list[tuple[str, Callable[..., object]]]:
 
 
 @pytest.mark.parametrize(("name", "function"), _public_functions())
-def test_public_functions_describe_parameters_and_result(
-    name: str, function: Callable[..., object]
-) -> None:
+def test_public_functions_describe_parameters_and_result(name, function):
     """A result needs a section of its own where neither its class nor the first sentence describes
     it."""
     doc = inspect.getdoc(function) or ""

@@ -126,9 +126,7 @@ def evaluated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", [*(name for name in NAMES if name not in RETURNED), *OTHERS])
-def test_the_example_prints_what_it_shows(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
-) -> None:
+def test_the_example_prints_what_it_shows(name, tmp_path, monkeypatch, request):
     reads_run = name == "harness.write_records" or 'Path("run")' in (
         inspect.getdoc(_thing(name)) or ""
     )

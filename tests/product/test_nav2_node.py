@@ -134,9 +134,7 @@ def test_a_path_is_that_of_the_planner(actions: Any, node: Any) -> None:
         (LEFT, SHUT, "NO_VALID_PATH"),
     ],
 )
-def test_a_plan_without_path_aborts_with_a_code_of_nav2(
-    actions: Any, node: Any, start: Any, goal: Any, code: str
-) -> None:
+def test_a_plan_without_path_aborts_with_a_code_of_nav2(actions, node, start, goal, code):
     action = actions.ComputePathToPose
     status, result = call(node, "compute_path_to_pose", asked(action, node, start, goal))
     assert status == "aborted"
@@ -166,9 +164,7 @@ def ros_goal(actions: Any) -> Any:
     return goal
 
 
-def test_the_robot_is_the_start_unless_one_is_given(
-    actions: Any, node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_robot_is_the_start_unless_one_is_given(actions, node, monkeypatch):
     goal = asked(actions.ComputePathToPose, node, LEFT, RIGHT, use_start=False)
     status, result = call(node, "compute_path_to_pose", goal)
     assert (status, result.error_code) == ("aborted", actions.ComputePathToPose.Result.TF_ERROR)
@@ -197,9 +193,7 @@ def test_poses_in_other_frames_are_refused(actions: Any, node: Any, name: str) -
 
 
 @pytest.mark.parametrize(("turn", "words"), [({"w": 0.0}, "quaternion of"), ({"x": 1.0}, "unit")])
-def test_hostile_goals_are_refused_with_words(
-    actions: Any, node: Any, turn: dict[str, float], words: str
-) -> None:
+def test_hostile_goals_are_refused_with_words(actions, node, turn, words):
     goal = asked(actions.ComputePathToPose, node, LEFT, RIGHT)
     goal.goal.pose.orientation.z = 0.0
     for name, value in turn.items():
@@ -268,9 +262,7 @@ def test_without_a_route_there_is_a_code(actions: Any, node: Any, goal: Any) -> 
     assert result.route.nodes == []
 
 
-def test_results_of_older_versions_lack_fields(
-    actions: Any, node: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_results_of_older_versions_lack_fields(actions, node, monkeypatch):
     """Humble has neither error_code nor error_msg, and no constants."""
     old = type("Result", (ros_stand_in.Message,), {"fields": {
         name: kind
@@ -339,9 +331,7 @@ def sent(store: Any, kind: str, given: Any) -> Any:
 
 
 @pytest.mark.parametrize("release", ["HUMBLE", "JAZZY", "KILTED", "LYRICAL"])
-def test_the_node_takes_and_makes_messages_of_each_release(
-    actions: Any, node: Any, release: str
-) -> None:
+def test_the_node_takes_and_makes_messages_of_each_release(actions, node, release):
     """Those of common_interfaces, whose definitions rosbags has; of Nav2's it has none."""
     store, posed_kind = get_typestore(Stores[f"ROS2_{release}"]), "geometry_msgs/msg/PoseStamped"
     ends = [

@@ -39,11 +39,7 @@ def _python(*arguments, **options):
 
 @pytest.mark.parametrize(
     ("endpoints", "code"),
-    [
-        (("0.5,1.5", "3.5,1.5"), 0),
-        (("-0.5,1.5", "3.5,1.5"), 1),
-        (("one,two", "3.5,1.5"), 2),
-    ],
+    [(("0.5,1.5", "3.5,1.5"), 0), (("-0.5,1.5", "3.5,1.5"), 1), (("one,two", "3.5,1.5"), 2)],
 )
 def test_exit_codes_of_the_program(endpoints, code):
     start, goal = endpoints

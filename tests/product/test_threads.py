@@ -101,8 +101,7 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
 
 
 @pytest.mark.parametrize(
-    "name",
-    [BY_OMPL[0], *(pytest.param(name, marks=pytest.mark.full) for name in BY_OMPL[1:])],
+    "name", [BY_OMPL[0], *(pytest.param(name, marks=pytest.mark.full) for name in BY_OMPL[1:])]
 )
 def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(name: str) -> None:
     pytest.importorskip("ompl")
@@ -131,8 +130,7 @@ def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(name: str)
 
 
 @pytest.mark.parametrize(
-    "method",
-    [GridAstar, GridDijkstra, WeightedAstar, HpaStar, SimpleGraphPyramid, ThrunMap],
+    "method", [GridAstar, GridDijkstra, WeightedAstar, HpaStar, SimpleGraphPyramid, ThrunMap]
 )
 def test_four_threads_on_one_baseline_get_the_answers_of_one(method: Any) -> None:
     grid = grid_with_rooms(seed=4, side=60)

@@ -184,12 +184,7 @@ def test_closures_of_every_kind_are_named_and_counted():
     start, goal = topology.grid.frame.points_of([[0, 1], [7, 1]])
     one, other = (door.number for door in topology.rooms.doors)
     band = shapely.box(0, 3.2 * resolution, 12 * resolution, 3.8 * resolution)
-    blocked = {
-        "doors": [one],
-        "cells": [(2, 5), (2, 6)],
-        "keepout": [band],
-        "rooms": ["high"],
-    }
+    blocked = {"doors": [one], "cells": [(2, 5), (2, 6)], "keepout": [band], "rooms": ["high"]}
     why = hn.explain(planner, start, goal, blocked={"doors": [one, other], "keepout": [band]})
     assert set(why.to_open) == {
         Closure("doors", one),

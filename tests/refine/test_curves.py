@@ -29,7 +29,7 @@ both = pytest.mark.parametrize("reverses", [False, True])
 @given(start=poses, goal=poses)
 @settings(max_examples=examples(125), derandomize=True)
 def test_curve_arrives_and_bends_by_its_radius(
-    reverses: bool,  # noqa: FBT001
+    reverses: bool,
     start: Any,
     goal: Any,
 ) -> None:
@@ -53,7 +53,7 @@ def test_curve_arrives_and_bends_by_its_radius(
 @given(start=poses, goal=poses)
 @settings(max_examples=examples(125), derandomize=True)
 def test_curve_is_as_long_as_that_of_ompl(
-    reverses: bool,  # noqa: FBT001
+    reverses: bool,
     start: Any,
     goal: Any,
 ) -> None:
@@ -89,7 +89,7 @@ def test_reversing_out_of_a_dead_end() -> None:
 
 
 @both
-def test_no_way_has_no_length(reverses: bool) -> None:  # noqa: FBT001
+def test_no_way_has_no_length(reverses: bool) -> None:
     curve = shortest_curve((1, 2, 3), (1, 2, 3), radius_m=1, reverses=reverses)
     assert curve.length_m == pytest.approx(0, abs=1e-9)
     assert curve.poses(0.1)[-1] == pytest.approx((1, 2, 3))
@@ -154,7 +154,7 @@ def test_base_outside_has_no_inscribed_disc() -> None:
 
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("step", [1, -1])
-def test_same_footprint_however_it_is_given(closed: bool, step: int) -> None:  # noqa: FBT001
+def test_same_footprint_however_it_is_given(closed: bool, step: int) -> None:
     corners = [*TRUCK, TRUCK[0]] if closed else TRUCK
     expected = shapely.Polygon(TRUCK)
     for shape in (corners[::step], np.array(corners)[::step], shapely.Polygon(corners[::step])):

@@ -84,7 +84,7 @@ def test_turns_on_the_spot_agree_with_shapely(yard: Yard) -> None:
 
 @given(yards, st.booleans())
 @settings(max_examples=examples(25), derandomize=True)
-def test_drives_agree_with_shapely(yard: Yard, backwards: bool) -> None:  # noqa: FBT001
+def test_drives_agree_with_shapely(yard: Yard, backwards: bool) -> None:
     for start in yard.starts(10):
         goal = yard.beside(start)
         valid = yard.check.drive_valid(*start, *goal, backwards=backwards)
@@ -96,7 +96,7 @@ def test_drives_agree_with_shapely(yard: Yard, backwards: bool) -> None:  # noqa
 
 @given(yards, st.booleans())
 @settings(max_examples=examples(30), derandomize=True)
-def test_paths_are_spelled_out_as_turns_and_drives(yard: Yard, reverses: bool) -> None:  # noqa: FBT001
+def test_paths_are_spelled_out_as_turns_and_drives(yard: Yard, reverses: bool) -> None:
     def may_go(first: Any, second: Any) -> bool:
         ways = (False, True) if reverses else (False,)
         return any(yard.check.drive_valid(*first, *second, backwards=back) for back in ways)

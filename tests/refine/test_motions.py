@@ -178,7 +178,7 @@ def test_turns_are_valid_where_shapely_finds_no_state_that_is_not(scenario: Scen
 
 
 @pytest.mark.parametrize("reverses", [False, True])
-def test_curves_are_valid_where_shapely_finds_no_state_that_is_not(reverses: bool) -> None:  # noqa: FBT001
+def test_curves_are_valid_where_shapely_finds_no_state_that_is_not(reverses: bool) -> None:
     n_valid = n_refused = 0
     for seed in range(examples(10)):
         scenario = Scenario(seed, 0.03)

@@ -35,9 +35,7 @@ def multigraphs(draw: st.DrawFn) -> tuple[int, list[tuple[int, int]], list[int],
 
 @given(multigraphs(), st.data())
 @settings(max_examples=examples(300))
-def test_cheapest_arcs_are_those_of_networkx_and_ties_go_by_the_second_cost(
-    graph: tuple[int, list[tuple[int, int]], list[int], list[int]], data: st.DataObject
-) -> None:
+def test_cheapest_arcs_are_those_of_networkx_and_ties_go_by_the_second_cost(graph, data):
     n, arcs, costs, ties = graph
     start, goal = data.draw(st.integers(0, n - 1)), data.draw(st.integers(0, n - 1))
     allowed = np.array(data.draw(st.lists(st.sampled_from([1, 1, 1, 0]), min_size=n, max_size=n)))

@@ -13,12 +13,7 @@ from hybridnav.maps import CellClass
 from hybridnav.route import RouteFinder
 from tests.strategies import class_grids, drawn, examples, occupancy_grid
 
-CORNERS = drawn(
-    "......",
-    ".##.#.",
-    ".#.#..",
-    "......",
-)
+CORNERS = drawn("......", ".##.#.", ".#.#..", "......")
 
 
 def test_walks_on_grids_with_corner_cutting_know_where_no_arc_is():

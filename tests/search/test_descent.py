@@ -170,9 +170,7 @@ def test_long_routes_are_found_part_by_part() -> None:
 
 @given(scenes(), st.sampled_from([1, 4, 9]), st.sampled_from(["small", "many", "few"]))
 @settings(max_examples=examples(150))
-def test_fields_above_are_what_arcs_connect_inside_a_block(
-    scene: Any, field_cells: int, kind: str
-) -> None:
+def test_fields_above_are_what_arcs_connect_inside_a_block(scene, field_cells, kind):
     pyramid, enterable = scene.pyramid("radius"), scene.classes == CellClass.FREE
     how = DescentSettings(field_cells=field_cells)
     limits = {"small": (0, 9, 2), "many": (10**9, 2, 2), "few": (10**9, 10**9, 2)}[kind]
@@ -232,9 +230,7 @@ def test_small_places_are_planned_from_blocks_above_them() -> None:
     st.sampled_from(["descent", "places"]),
 )
 @settings(max_examples=examples(200))
-def test_paper_is_right_with_closures_costs_and_unexplored_cells(
-    scene: Any, seed: int, kind: str, levels: str
-) -> None:
+def test_paper_is_right_with_closures_costs_and_unexplored_cells(scene, seed, kind, levels):
     unexplored, by_costs = kind in {"unexplored", "both"}, kind in {"costs", "both"}
     rng = np.random.default_rng(seed)
     grid = scene.grid
@@ -267,9 +263,7 @@ def test_paper_is_right_with_closures_costs_and_unexplored_cells(
         least = optimum * grid.resolution_m
         if by_costs:
             whole = hn.HybridPlanner(
-                topology,
-                preset=hn.load_preset("grid-astar", overrides=overrides[:1]),
-                costs=costs,
+                topology, preset=hn.load_preset("grid-astar", overrides=overrides[:1]), costs=costs
             )
             least = whole.plan(*points, blocked={"cells": np.argwhere(shut & enterable)}).cost
         assert result.lower_bound == pytest.approx(least, rel=1e-9)
@@ -310,9 +304,7 @@ def test_a_watched_descent_narrows_to_its_path(scene: Any, how: Any, seed: int) 
         (slice(0, 200), 128, ["kept", "whole"]),
     ],
 )
-def test_closed_cells_widen_the_search_step_by_step(
-    closed: slice, horizon: int, stages: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_closed_cells_widen_the_search_step_by_step(closed, horizon, stages, monkeypatch):
     """First by windows that go round, then in fields kept above, at last on the whole map."""
     walls = np.zeros((200, 200), dtype=np.float32)
     walls[:, 100] = 1

@@ -172,9 +172,7 @@ def inside_of(enterable: Bools, corridor: tuple[Labels, Bools] | None) -> Bools:
 
 @given(cases())
 @settings(max_examples=examples(500))
-def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
-    case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any],
-) -> None:
+def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(case):
     enterable, corner_cutting, corridor, rng = case
     inside = inside_of(enterable, corridor)
     assume(inside.any())
@@ -190,9 +188,7 @@ def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(
 
 
 @given(cases())
-def test_only_paths_below_the_limit_are_found(
-    case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any],
-) -> None:
+def test_only_paths_below_the_limit_are_found(case):
     enterable, corner_cutting, corridor, rng = case
     inside = inside_of(enterable, corridor)
     assume(inside.any())
@@ -217,9 +213,7 @@ def test_only_paths_below_the_limit_are_found(
 
 @given(cases(), st.sampled_from([1, 3, 20]))
 @settings(max_examples=examples(200))
-def test_blocked_cells_are_as_on_a_grid_without_them_and_only_for_one_search(
-    case: tuple[Bools, bool, tuple[Labels, Bools] | None, Any], n_blocked: int
-) -> None:
+def test_blocked_cells_are_as_on_a_grid_without_them_and_only_for_one_search(case, n_blocked):
     enterable, corner_cutting, corridor, rng = case
     inside = inside_of(enterable, corridor)
     assume(inside.any())
@@ -250,9 +244,7 @@ def test_from_and_to_a_blocked_cell_there_is_no_path(end: tuple[int, int]) -> No
     assert search.search((0, 0), (2, 3), blocked=np.empty(0, np.int64)).cells is not None
 
 
-def test_blocked_cells_open_again_after_a_search_that_fails(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_blocked_cells_open_again_after_a_search_that_fails(monkeypatch):
     enterable = np.ones((4, 5), dtype=np.bool_)
     search = GridSearch(enterable)
 
@@ -267,9 +259,7 @@ def test_blocked_cells_open_again_after_a_search_that_fails(
 
 
 @pytest.mark.parametrize("corner_cutting", [False, True])
-def test_successors_are_left_out_for_a_path_as_good_and_diagonal_first(
-    corner_cutting: bool,  # noqa: FBT001 - a parameter of the test
-) -> None:
+def test_successors_are_left_out_for_a_path_as_good_and_diagonal_first(corner_cutting):
     # All 3 x 3 maps round a cell x that is reached from one of its neighbours, p.
     successors, detours = (
         table.reshape(9, 256) for table in move_tables(corner_cutting=corner_cutting)
@@ -363,9 +353,7 @@ def test_the_length_of_a_path_counts_its_moves(straight: int, diagonal: int, see
 
 
 @given(st.tuples(*[st.integers(0, 11)] * 4))
-def test_without_obstacles_the_shortest_path_has_the_octile_distance(
-    offsets: tuple[int, int, int, int],
-) -> None:
+def test_without_obstacles_the_shortest_path_has_the_octile_distance(offsets):
     start, goal = offsets[:2], offsets[2:]
     found = GridSearch(np.ones((12, 12), dtype=np.bool_)).search(start, goal)
     assert found.cells is not None

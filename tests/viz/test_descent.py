@@ -62,9 +62,7 @@ def test_small_fields_of_the_route_are_seen(watched: WatchedDescent) -> None:
         np.testing.assert_allclose([box.min, box.max], [low - half, high + half])
 
 
-def test_an_animation_shows_each_level_and_then_the_path_as_it_grows(
-    watched: WatchedDescent, tmp_path: Path
-) -> None:
+def test_an_animation_shows_each_level_and_then_the_path_as_it_grows(watched, tmp_path):
     save_descent(GRID, watched, tmp_path / "descent.gif")
     with Image.open(tmp_path / "descent.gif") as animation:
         frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(animation)]

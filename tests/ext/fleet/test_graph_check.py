@@ -83,9 +83,7 @@ def without(*edges: tuple[str, str]) -> Callable[[nx.Graph[str]], object]:
     return lambda plain: plain.remove_edges_from(edges)
 
 
-def test_a_sound_graph_has_no_findings_and_its_routes_are_followed(
-    house: hn.ext.fleet.Building,
-) -> None:
+def test_a_sound_graph_has_no_findings_and_its_routes_are_followed(house):
     matched = match_graph(house, drawn())
     assert found(check_building_graph(matched)) == {}
     report = judge_building_graph(matched, pairs=60)

@@ -162,7 +162,7 @@ class ByWords:
 @pytest.mark.parametrize("clear", [False, True])
 @PLAIN
 @given(SEEDS)
-def test_routes_are_those_of_the_policy(clear: bool, seed: int) -> None:  # noqa: FBT001
+def test_routes_are_those_of_the_policy(clear: bool, seed: int) -> None:
     drawing = drawn(seed)
     scene, building = drawing.scene, drawing.scene.building
     stairs = bool(scene.rng.random() < 0.7)

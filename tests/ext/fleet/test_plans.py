@@ -123,7 +123,7 @@ def test_cells(preset: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("charged", [True, False])
-def test_hundreds_of_links(charged: bool) -> None:  # noqa: FBT001 - a parameter of the test
+def test_hundreds_of_links(charged: bool) -> None:
     """The best of 300 links, also where rides cost nothing and floors have closed cells."""
     scene = random_building(11, preset="octile", most_floors=4, shape=(24, 28))
     floors, rng = scene.building.floors, scene.rng

@@ -318,11 +318,7 @@ def test_who_may_use_a_link() -> None:
             hn.HybridPlanner(
                 hn.TopologicalMap(
                     hn.DualGraphPyramid.build(
-                        replace(
-                            floor.planner.grid,
-                            robot_radius_m=0.3,
-                            radius_is_default=False,
-                        )
+                        replace(floor.planner.grid, robot_radius_m=0.3, radius_is_default=False)
                     )
                 )
             ),

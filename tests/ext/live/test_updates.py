@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import strategies as st
-from hypothesis.stateful import (
-    RuleBasedStateMachine,
-    initialize,
-    invariant,
-    rule,
-)
+from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
 import hybridnav as hn
 from benchmarks.common import OFFICE, with_classes
@@ -119,10 +114,7 @@ class Robot(RuleBasedStateMachine):
             painted[:] = kind
         self.follow(classes, changed=(low, left, high + 1, right + 1))
 
-    @rule(
-        by=st.tuples(*[st.integers(0, 3)] * 4),
-        kind=st.sampled_from([0, 1, 2]),
-    )
+    @rule(by=st.tuples(*[st.integers(0, 3)] * 4), kind=st.sampled_from([0, 1, 2]))
     def grow(self, by, kind):
         """Widen the map on any side."""
         south, north, west, east = by

@@ -194,9 +194,7 @@ def test_rooms_of_a_floor_are_named_and_saved(shown: Shown, folder: Path) -> Non
 
 
 @pytest.mark.full
-def test_a_saved_page_has_all_floors(
-    cli: Any, building: Client, folder: Path, browser: Any
-) -> None:
+def test_a_saved_page_has_all_floors(cli, building, folder, browser):
     del building  # has written the files
     out = folder.parent / "page.html"
     own = hn.ext.fleet.load_building(folder / "building.yaml", robot_radius_m=0.2)

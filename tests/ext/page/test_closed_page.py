@@ -60,9 +60,7 @@ def test_who_goes_is_chosen_and_told(people: list[Shown]) -> None:
     assert not german.page.locator("#stairs").is_visible()
 
 
-def test_a_refused_profile_says_why_until_another_is_chosen(
-    people: list[Shown], folder: Path
-) -> None:
+def test_a_refused_profile_says_why_until_another_is_chosen(people, folder):
     hn.Journal(folder / "house.yaml").close("link:lift")
     for shown in people:
         shown.wait_text("#closed", "lift")
@@ -162,9 +160,7 @@ def test_a_closed_room_stays_closed_under_its_new_name(people: list[Shown], fold
 
 
 @pytest.mark.full
-def test_a_robot_tries_closures_on_its_page_alone(
-    browser: Any, house: Client, folder: Path
-) -> None:
+def test_a_robot_tries_closures_on_its_page_alone(browser, house, folder):
     context = browser.new_context(**WINDOW)
     shown = Shown(context, house.address)
     shown.page.select_option("#close-link", "lift")

@@ -50,9 +50,7 @@ def is_over(connection: socket.socket) -> bool:
         return True
 
 
-def test_the_page_answers_beside_four_hundred_connections_that_wait(
-    client: Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_page_answers_beside_four_hundred_connections_that_wait(client, monkeypatch):
     monkeypatch.setattr(app, "REQUEST_S", 600.0)
     with ExitStack() as stack:
         made = [stack.enter_context(opened(client, HEAD)) for _ in range(400)]

@@ -23,9 +23,7 @@ NUMBERS = st.floats(-3, 21, allow_nan=False)
 
 @settings(max_examples=examples(60))
 @given(st.tuples(NUMBERS, NUMBERS), st.tuples(NUMBERS, NUMBERS))
-def test_a_cut_leaves_every_cell_on_its_side(
-    one: tuple[float, float], other: tuple[float, float]
-) -> None:
+def test_a_cut_leaves_every_cell_on_its_side(one, other):
     change = Split(op="split", room="b", line=[list(one), list(other)], name="new")
     left = np.array(
         [
@@ -71,9 +69,7 @@ def test_a_name_takes_its_point_along() -> None:
 
 @settings(max_examples=examples(40))
 @given(st.integers(0, 3), NUMBERS, NUMBERS)
-def test_a_moved_corner_changes_the_cells_between_both_outlines(
-    which: int, x: float, y: float
-) -> None:
+def test_a_moved_corner_changes_the_cells_between_both_outlines(which, x, y):
     ring = rings_of(ROOMS, GRID)[1][0]
     corner = ring[which % len(ring)]
     moved = [[x, y] if each == corner else each for each in ring]

@@ -51,9 +51,7 @@ def test_rooms_as_geojson_are_the_rooms(client: Client) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_full_disk_is_one_line(
-    client: Client, folder: Path, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_one_line(client, folder, kind, monkeypatch):
     before = sorted(file.name for file in folder.iterdir())
     name, value = _request(kind)
 
@@ -72,9 +70,7 @@ def test_a_full_disk_is_one_line(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_folder_that_cannot_be_written_is_one_line(
-    client: Client, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(client, kind, monkeypatch):
     def refused(*_: object, **__: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
@@ -107,9 +103,7 @@ def _downloaded(shown: Shown, button: str, folder: Path) -> Path:
 
 
 @pytest.mark.full
-def test_every_button_hands_out_a_file_that_others_read(
-    shown: Shown, client: Client, tmp_path: Path
-) -> None:
+def test_every_button_hands_out_a_file_that_others_read(shown, client, tmp_path):
     shown.page.click("[data-export=path-csv]")
     shown.wait_text("#status", "Set a start and a goal first")
     shown.click(10.5, 40.5)
@@ -144,9 +138,7 @@ def test_every_button_hands_out_a_file_that_others_read(
 
 
 @pytest.mark.full
-def test_what_cannot_be_written_is_said_and_nothing_is_lost(
-    shown: Shown, client: Client, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_what_cannot_be_written_is_said_and_nothing_is_lost(shown, client, monkeypatch, tmp_path):
     shown.click(10.5, 40.5)
     shown.click(70.5, 10.5)
     shown.wait_plan(1)

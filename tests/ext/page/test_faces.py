@@ -39,9 +39,7 @@ def _opened(browser: Any, client: Client, size: Any = None, **more: Any) -> Show
     ("size", "language"),
     [(PHONE, "de"), *(pytest.param(*one, marks=pytest.mark.full) for one in OTHERS)],
 )
-def test_from_the_entrance_to_a_ward(
-    browser: Any, house: Client, folder: Path, size: dict[str, int], language: str
-) -> None:
+def test_from_the_entrance_to_a_ward(browser, house, folder, size, language):
     texts = _table(language)
     shown = _opened(browser, house, size, locale=language)
     shown.take("start", "ENTR")
@@ -147,9 +145,7 @@ def test_what_the_server_says_is_said_in_german(browser: Any, house: Client) -> 
 
 
 @pytest.mark.full
-def test_a_line_of_the_words_lights_its_door_and_the_other_way_round(
-    browser: Any, house: Client
-) -> None:
+def test_a_line_of_the_words_lights_its_door_and_the_other_way_round(browser, house):
     shown = _opened(browser, house)
     shown.take("start", "entrance")
     shown.take("goal", "office 10")
@@ -224,9 +220,7 @@ def test_lists_have_ward_2_before_ward_10(browser: Any, wards: Path) -> None:
 
 
 @pytest.mark.parametrize("size", [PHONE, pytest.param(LAPTOP, marks=pytest.mark.full)])
-def test_names_stay_inside_of_their_rooms_or_are_left_out(
-    browser: Any, folder: Path, size: dict[str, int]
-) -> None:
+def test_names_stay_inside_of_their_rooms_or_are_left_out(browser, folder, size):
     names = ("a name that is far too long for a room of nine metres", "ward 2", "ward 10", "d")
     write_map(folder, rooms=names)
     grid = hn.load_map(folder / "four.yaml", robot_radius_m=0.2)

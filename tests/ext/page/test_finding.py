@@ -153,9 +153,7 @@ def test_favourites_are_not_written_through_a_link(folder: Path) -> None:
     assert (folder.parent / "secret.txt").read_text("utf-8") == "secret"
 
 
-def test_no_more_favourites_are_written_than_are_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_more_favourites_are_written_than_are_read(tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "_MOST_OF_FAVOURITES", 100)
     places = [(0, f"a room {number}") for number in range(9)]
     finder, site = kept.Finder(tmp_path), kept.Named("site", ("ground",), places)
@@ -167,9 +165,7 @@ def test_no_more_favourites_are_written_than_are_read(
     finder.favour(site, Favour(floor=0, name="a room 0", kept=False))
 
 
-def test_no_more_changes_are_kept_than_are_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_more_changes_are_kept_than_are_read(tmp_path, monkeypatch):
     monkeypatch.setattr(kept, "_MOST_BYTES", 200)
     file = kept.RoomsFile(tmp_path, "rooms.yaml")
     few, many = [{"name": "x" * 50}], [{"name": "x" * 200}]

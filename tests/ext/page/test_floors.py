@@ -132,9 +132,7 @@ def test_names_are_saved_to_the_file_of_their_floor(building: Client, folder: Pa
         ),
     ],
 )
-def test_a_link_that_loses_its_room_is_named(
-    building: Client, folder: Path, change: dict[str, Any], caution: str
-) -> None:
+def test_a_link_that_loses_its_room_is_named(building, folder, change, caution):
     building.post("floor/1/edit", {"version": 0, "change": change})
     notice = building.post("floor/1/save", {"version": 1}).value["notice"]
     assert notice.startswith(f"saved to rooms-2.yaml; {caution}")
@@ -210,9 +208,7 @@ def test_files_of_a_building(building: Client, folder: Path, tmp_path: Path) -> 
     assert (refused.code, "does not visit" in refused.value["error"]) == (422, True)
 
 
-def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(folder, tmp_path):
     model, out = tmp_path / "building.hnm", tmp_path / "changed.hnm"
     hn.save(hn.ext.fleet.load_building(write_building(folder), robot_radius_m=0.2), model)
     before = sorted(tmp_path.iterdir())
@@ -230,9 +226,7 @@ def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(
     assert set(rooms.names) == {"attic", "f", "g", "h"}
 
 
-def test_what_is_out_of_order_and_who_goes_are_told_and_changed(
-    building: Client, folder: Path
-) -> None:
+def test_what_is_out_of_order_and_who_goes_are_told_and_changed(building, folder):
     found = building.get("closed.json").value
     assert [one["name"] for one in found["profiles"]] == ["visitor", "staff", "wheelchair", "cart"]
     assert (found["closed"], found["can_close"]) == ([], True)

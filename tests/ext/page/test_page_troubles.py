@@ -66,9 +66,7 @@ def test_a_change_that_is_refused_is_said_and_stays_said(shown: Shown) -> None:
     assert shown.page.evaluate(SEEN)
 
 
-def test_a_level_of_too_many_vertices_says_so_until_another_is_chosen(
-    shown: Shown, client: Client, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_level_of_too_many_vertices_says_so_until_another_is_chosen(shown, client, monkeypatch):
     monkeypatch.setattr("hybridnav.ext.page.drawing.MOST_VERTICES", 100)
     assert client.get("floor/0/graph/0.json").value["drawn"] is False
     shown.page.select_option("#colours", "level")
@@ -99,9 +97,7 @@ def test_that_there_are_no_routes_is_said(shown: Shown) -> None:
 @pytest.mark.parametrize(
     ("button", "name"), [("#alternatives", "alternatives"), ("#optimum", "optimum")]
 )
-def test_an_answer_about_ends_that_were_moved_is_dropped(
-    shown: Shown, button: str, name: str
-) -> None:
+def test_an_answer_about_ends_that_were_moved_is_dropped(shown, button, name):
     _planned(shown)
     held: list[Any] = []
     shown.page.route(f"**/{name}", lambda route: held.append(route))  # noqa: PLW0108 - Playwright writes on it
@@ -164,9 +160,7 @@ def test_what_is_closed_no_more_is_said(shown: Shown) -> None:
     assert shown.text("#closed") == ""
 
 
-def test_rooms_that_another_page_has_saved_are_not_called_unsaved(
-    context: Any, shown: Shown
-) -> None:
+def test_rooms_that_another_page_has_saved_are_not_called_unsaved(context, shown):
     other = Shown(context, shown.page.url)
     shown.mode("names")
     shown.page.select_option("#room", "a")

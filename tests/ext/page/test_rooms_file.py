@@ -61,9 +61,7 @@ def test_undo_goes_back_change_by_change(client: Client) -> None:
     assert client.post("floor/0/undo", {"version": 4}).code == 422
 
 
-def test_a_file_that_others_changed_is_not_written_over_unasked(
-    client: Client, folder: Path
-) -> None:
+def test_a_file_that_others_changed_is_not_written_over_unasked(client, folder):
     _rename(client, 0, "a", "kitchen")
     text = (folder / "rooms.yaml").read_text(encoding="utf-8").replace("name: d", "name: attic")
     (folder / "rooms.yaml").write_text(text, encoding="utf-8")
@@ -73,9 +71,7 @@ def test_a_file_that_others_changed_is_not_written_over_unasked(
     assert client.post("floor/0/save", {"version": 1, "replace": True}).code == 200
 
 
-def test_a_full_disk_loses_neither_the_file_nor_the_names(
-    client: Client, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_loses_neither_the_file_nor_the_names(client, folder, monkeypatch):
     before = (folder / "rooms.yaml").read_bytes()
 
     def full(*_: object, **__: object) -> None:
@@ -200,9 +196,7 @@ def test_doors_keep_their_numbers_when_rooms_change(folder: Path, known: str) ->
         before = now
 
 
-def test_a_second_save_writes_over_only_what_the_first_told_of(
-    client: Client, folder: Path
-) -> None:
+def test_a_second_save_writes_over_only_what_the_first_told_of(client, folder):
     file = folder / "rooms.yaml"
 
     def changed_by_others(name: str) -> str:

@@ -42,18 +42,13 @@ def test_the_file_holds_the_map_the_rooms_and_the_routes(cli: Any, folder: Path)
     ]
     planned = [
         cli("plan", folder / "four.yaml", "--robot-radius", 0.2, *ends, "--json").answer
-        for ends in (
-            ("--start", "0,4", "--goal", "9,12"),
-            ("--start", "9,12", "--goal", "0,4"),
-        )
+        for ends in (("--start", "0,4", "--goal", "9,12"), ("--start", "9,12", "--goal", "0,4"))
     ]
     lengths = [route["length_m"] for route in data["routes"]]
     assert lengths == pytest.approx([plan["length_m"] for plan in planned])
 
 
-def test_the_file_has_all_ways_between_rooms_and_a_proof_for_each_start(
-    cli: Any, folder: Path
-) -> None:
+def test_the_file_has_all_ways_between_rooms_and_a_proof_for_each_start(cli, folder):
     data = _data(_save(cli, folder)[1])
     (floor,), matrix = data["floors"], data["matrix"]
     names = [end["name"] for end in data["ends"]]
@@ -79,9 +74,7 @@ def test_the_file_has_all_ways_between_rooms_and_a_proof_for_each_start(
 
 
 @pytest.mark.full
-def test_the_office_with_all_its_routes_stays_below_three_megabytes(
-    cli: Any, tmp_path: Path
-) -> None:
+def test_the_office_with_all_its_routes_stays_below_three_megabytes(cli, tmp_path):
     office, out = Path(__file__).parents[3] / "maps/office/office.yaml", tmp_path / "office.html"
     cli("view", office, "--robot-radius", 0.25, "--save", out)
     assert len(_data(out)["matrix"]) == 23
@@ -113,9 +106,7 @@ def test_a_name_cannot_end_the_script(cli: Any, folder: Path) -> None:
         (("--save", "page.txt"), "must end in .html"),
     ],
 )
-def test_what_cannot_be_saved_is_refused(
-    cli: Any, folder: Path, more: tuple[str, ...], words: str
-) -> None:
+def test_what_cannot_be_saved_is_refused(cli, folder, more, words):
     done, _ = _save(cli, folder, *more)
     assert done.refuses(2, words)
 

@@ -150,9 +150,7 @@ def test_files_that_a_site_has_not_are_refused(client: Client, kind: str, value:
     ],
 )
 @pytest.mark.parametrize("method", ["GET", "POST"])
-def test_foreign_origins_and_hosts_are_refused(
-    client: Client, headers: dict[str, str], method: str
-) -> None:
+def test_foreign_origins_and_hosts_are_refused(client, headers, method):
     if method == "GET":
         for name in ("map.json", "floor/0/map.json"):
             assert client.get(name, **headers).code == 403
@@ -268,9 +266,7 @@ def test_changes_that_are_none_are_refused(client: Client, change: dict[str, Any
         (b" " * 3_000_000, "application/json", 413),
     ],
 )
-def test_bodies_that_are_no_json_are_refused(
-    client: Client, body: bytes, kind: str, code: int
-) -> None:
+def test_bodies_that_are_no_json_are_refused(client, body, kind, code):
     answer = client.send("POST", f"/{TOKEN}/plan", body, {"content-type": kind})
     assert answer.code == code
 

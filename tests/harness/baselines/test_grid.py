@@ -61,9 +61,7 @@ def make(name: str, grid: OccupancyGrid) -> Solver:
 @pytest.mark.parametrize("name", METHODS)
 @settings(max_examples=examples(40))
 @given(classes=class_grids(), seed=st.integers(0, 1000))
-def test_paths_are_legal_and_as_long_as_the_bound_allows(
-    name: str, classes: Any, seed: int
-) -> None:
+def test_paths_are_legal_and_as_long_as_the_bound_allows(name, classes, seed):
     grid = occupancy_grid(classes)
     method = make(name, grid)
     enterable = classes == CellClass.FREE
@@ -160,13 +158,7 @@ def test_weights_below_one_are_refused(weight: float) -> None:
 
 Cell = tuple[int, int]
 # A room that no path enters.
-SEALED = drawn(
-    ".........",
-    "..####...",
-    "..#..#...",
-    "..####...",
-    ".........",
-)
+SEALED = drawn(".........", "..####...", "..#..#...", "..####...", ".........")
 
 
 def map_of(grid: Any, **build: Any) -> hn.TopologicalMap:
@@ -275,9 +267,7 @@ def test_a_map_without_a_free_cell_can_be_prepared(line: str) -> None:
 
 @settings(max_examples=examples(80))
 @given(scene=scenes(), seed=st.integers(0, 10**6))
-def test_the_simple_graph_plans_as_the_multigraph_where_no_arcs_are_parallel(
-    scene: Scene, seed: int
-) -> None:
+def test_the_simple_graph_plans_as_the_multigraph_where_no_arcs_are_parallel(scene, seed):
     topology = map_of_scene(scene)
     method = SimpleGraphPyramid(topology)
     report = report_of(topology.arcs, topology.n_places)

@@ -65,9 +65,7 @@ def _pinched(free: Any, row: int, col: int) -> bool:
 
 @given(class_grids(max_side=12), seeds, yaws)
 @settings(max_examples=examples(150))
-def test_optimum_lies_between_the_straight_line_and_the_grid_optimum(
-    classes: Any, seed: int, yaw_rad: float
-) -> None:
+def test_optimum_lies_between_the_straight_line_and_the_grid_optimum(classes, seed, yaw_rad):
     start, goal = two_cells(classes, seed)
     grid = framed(classes, yaw_rad)
     octile_m = ScipyOptimum(grid).lengths_from(start)[goal]
@@ -112,9 +110,7 @@ ONE_SQUARE[3:9, 3:9] = CellClass.OCCUPIED
         ((7, 1), (7, 1), 0.0),
     ],
 )
-def test_one_square_obstacle_has_the_known_shortest_paths(
-    start: Cell, goal: Cell, length: float
-) -> None:
+def test_one_square_obstacle_has_the_known_shortest_paths(start, goal, length):
     found = VisibilityGraph(framed(ONE_SQUARE)).shortest(start, goal)
     assert found.length_m == pytest.approx(length * 0.05, rel=1e-12)
 

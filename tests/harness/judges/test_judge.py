@@ -182,9 +182,7 @@ PINCHED = drawn(".#.", "#..", "...")
     ],
 )
 @pytest.mark.parametrize("yaw_rad", [0.0, 0.7])
-def test_polylines_touch_blocked_cells_and_never_squeeze_between_two(
-    positions: Any, fault: str | None, yaw_rad: float
-) -> None:
+def test_polylines_touch_blocked_cells_and_never_squeeze_between_two(positions, fault, yaw_rad):
     faults = faults_of(framed(PINCHED, yaw_rad), *positions)
     assert len(faults) == (0 if fault is None else 1)
     assert fault is None or fault in faults[0]
@@ -198,13 +196,7 @@ def test_a_line_along_the_side_of_two_blocked_cells_is_not_free() -> None:
     assert "side between two blocked cells" in rim
 
 
-ROOM = drawn(
-    ".....",
-    "..#..",
-    ".....",
-    ".#.?.",
-    "..#..",
-)
+ROOM = drawn(".....", "..#..", ".....", ".#.?.", "..#..")
 
 
 @pytest.mark.parametrize(
@@ -278,7 +270,7 @@ def test_an_empty_path_is_a_fault_and_a_single_cell_is_none() -> None:
 
 
 @given(class_grids(), seeds, st.booleans())
-def test_optima_are_those_of_an_edge_list(classes: Any, seed: int, allow: bool) -> None:  # noqa: FBT001
+def test_optima_are_those_of_an_edge_list(classes: Any, seed: int, allow: bool) -> None:
     enterable = (classes == CellClass.FREE) | ((classes == CellClass.UNEXPLORED) & allow)
     assume(enterable.any())
     rng = np.random.default_rng(seed)

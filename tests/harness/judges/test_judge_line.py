@@ -28,13 +28,7 @@ from tests.oracle.grid import distances, move_graph
 from tests.search.test_grid_search import weighted
 from tests.strategies import class_grids, drawn, examples, framed, occupancy_grid
 
-ROOM = drawn(
-    ".....",
-    "..#..",
-    ".....",
-    ".#.?.",
-    "..#..",
-)
+ROOM = drawn(".....", "..#..", ".....", ".#.?.", "..#..")
 
 
 @given(class_grids(max_side=8), st.integers(0, 2**32 - 1))
@@ -151,11 +145,7 @@ def arc(radius_m: float, start_rad: float, turn_rad: float) -> tuple[Any, Any]:
 )
 @settings(max_examples=examples(60))
 def test_chords_lie_on_the_circle_and_have_its_length(
-    radius_m: float,
-    start_rad: float,
-    turn_rad: float,
-    to_the_left: bool,  # noqa: FBT001 - drawn
-    seed: int,
+    radius_m: float, start_rad: float, turn_rad: float, to_the_left: bool, seed: int
 ) -> None:
     turn_rad = turn_rad if to_the_left else -turn_rad
     points, headings = arc(radius_m, start_rad, turn_rad)

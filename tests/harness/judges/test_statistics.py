@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from hybridnav.errors import InvalidValueError
-from hybridnav.harness.judges import (
-    distance_buckets,
-    paired_difference,
-    summarise,
-    thrun_count,
-)
+from hybridnav.harness.judges import distance_buckets, paired_difference, summarise, thrun_count
 
 losses = st.lists(st.one_of(st.just(0.0), st.floats(0, 2)), min_size=1, max_size=60)
 

@@ -220,9 +220,7 @@ def frames(draw: st.DrawFn) -> hn.Frame:
 @pytest.mark.filterwarnings("ignore:.*no cell of the mask:hybridnav.errors.MapWarning")
 @given(st.data())
 @settings(max_examples=examples(100), deadline=None)
-def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
+def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(tmp_path_factory, data):
     own, frame = data.draw(frames()), data.draw(frames())
     pose = data.draw(st.tuples(lengths, lengths, angles) | st.just((0.0, 0.0, 0.0)))
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
@@ -269,9 +267,7 @@ def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(
 )
 @example(0, 0.0, 2.225073858507203e-309, "percent", 1.0)
 @settings(max_examples=examples(300), deadline=None)
-def test_limits_are_those_of_the_speed_filter(
-    value: int, base: float, multiplier: float, unit: Any, full: float
-) -> None:
+def test_limits_are_those_of_the_speed_filter(value, base, multiplier, unit, full):
     """SpeedFilter::process: 0 and unknown limit nothing, base + multiplier * value else; a limit
     below 0, or of more than 100 percent, is dropped, and 0 is no limit."""
     grid = grid_of(np.zeros((1, 1)), robot_radius_m=0)

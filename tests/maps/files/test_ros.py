@@ -493,13 +493,7 @@ def written_again(path: Path, folder: Path) -> Path:
 )
 @settings(max_examples=examples(100))
 @pytest.mark.filterwarnings("ignore:.* cells have grey 205:hybridnav.errors.MapWarning")
-def test_an_image_of_8_bits_is_written_with_equal_pixels(
-    folder: Path,
-    pixels: np.ndarray,
-    origin: tuple[float, float, float],
-    side: float,
-    limits: tuple[float, float],
-) -> None:
+def test_an_image_of_8_bits_is_written_with_equal_pixels(folder, pixels, origin, side, limits):
     Image.fromarray(pixels).save(folder / "given.pgm")
     given_yaml = {
         "image": "given.pgm",
@@ -526,9 +520,7 @@ def test_our_maps_are_written_with_equal_pixels(name: str, tmp_path: Path) -> No
 )
 @example(np.array([[0.1953125]], dtype=np.float32), (0.5, 1.0))
 @settings(max_examples=examples(100))
-def test_cells_keep_their_class_and_nearly_their_occupancy(
-    folder: Path, probability: np.ndarray, limits: tuple[float, float]
-) -> None:
+def test_cells_keep_their_class_and_nearly_their_occupancy(folder, probability, limits):
     low, high = limits
     grid = hn.OccupancyGrid(
         probability, free_threshold=low, occupied_threshold=high, robot_radius_m=0

@@ -107,9 +107,7 @@ def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int, kind:
     epsilon=st.sampled_from([0.01, 0.1, 1.0]),
     kind=st.sampled_from(KINDS),
 )
-def test_epsilon_bounds_the_ratio_of_length_and_bound(
-    classes: Any, seed: int, epsilon: float, kind: str
-) -> None:
+def test_epsilon_bounds_the_ratio_of_length_and_bound(classes, seed, epsilon, kind):
     free = classes == CellClass.FREE
     assume(free.any())
     search = search_of(build_mesh(free), kind)
@@ -126,9 +124,7 @@ def test_epsilon_bounds_the_ratio_of_length_and_bound(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_search_out_of_time_without_a_path_still_bounds(
-    monkeypatch: pytest.MonkeyPatch, kind: str
-) -> None:
+def test_a_search_out_of_time_without_a_path_still_bounds(monkeypatch, kind):
     search = search_of(build_mesh(scattered()), kind)
     found = list(interrupted(search, (0, 0), (39, 39), monkeypatch))
     assert len(found) > 10

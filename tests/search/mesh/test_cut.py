@@ -211,9 +211,7 @@ def detour_of(
 
 @settings(max_examples=examples(120), deadline=None)
 @given(closures(), seeds, st.sampled_from(KINDS))
-def test_a_detour_is_the_shortest_path_of_a_mesh_without(
-    case: tuple[Any, Any], seed: int, kind: str
-) -> None:
+def test_a_detour_is_the_shortest_path_of_a_mesh_without(case, seed, kind):
     left, search, round_it, anew = detour_of(case, kind)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells
@@ -231,9 +229,7 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(
 
 @settings(max_examples=examples(40), deadline=None)
 @given(closures(), seeds)
-def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(
-    case: tuple[Any, Any], seed: int
-) -> None:
+def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(case, seed):
     free, closed = case
     search = MeshSearch(build_mesh(free))
     search.prepare()
@@ -254,9 +250,7 @@ def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(
 
 @settings(max_examples=examples(60), deadline=None)
 @given(closures(), seeds)
-def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(
-    case: tuple[Any, Any], seed: int
-) -> None:
+def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(case, seed):
     free, closed = case
     before = free ^ (np.random.default_rng(seed).random(free.shape) < 0.1)
     left = without(free, closed)
@@ -286,9 +280,7 @@ def test_many_paths_are_judged_as_one_by_one(case: tuple[Any, Any], seed: int) -
 
 
 @pytest.mark.parametrize("is_prepared", [False, True])
-def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(
-    *, is_prepared: bool
-) -> None:
+def test_a_path_along_a_closed_cell_is_left_alone_and_one_across_is_not(*, is_prepared):
     free = np.ones((6, 9), np.bool_)
     free[2, 4] = False
     search = MeshSearch(build_mesh(free))
@@ -322,9 +314,7 @@ def test_two_cells_that_meet_at_a_corner_let_nothing_through(*, is_prepared: boo
 
 @settings(max_examples=examples(25), deadline=None)
 @given(closures(), seeds, st.sampled_from([0.01, 0.3]))
-def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(
-    case: tuple[Any, Any], seed: int, epsilon: float
-) -> None:
+def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(case, seed, epsilon):
     left, _, round_it, anew = detour_of(case)
     for query in queries(left, seed):
         optimum = anew.path(*query).length_cells

@@ -106,9 +106,7 @@ def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed:
         assert back.length_cells == pytest.approx(found.length_cells)
 
 
-def test_a_graph_with_an_edge_without_its_reverse_is_not_used(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_graph_with_an_edge_without_its_reverse_is_not_used(monkeypatch):
     classes = drawn(".....", ".###.", ".###.", ".....")
     graph, mesh = VisibilityGraph(occupancy_grid(classes)), build_mesh(classes == CellClass.FREE)
     whole = MeshSearch(mesh)
@@ -143,9 +141,7 @@ def test_copies_of_a_search_answer_by_the_kernels_that_are_compiled() -> None:
             assert not array.flags.writeable
 
 
-def test_threads_may_share_a_search_while_it_prepares_itself(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_threads_may_share_a_search_while_it_prepares_itself(monkeypatch):
     monkeypatch.setattr("hybridnav.search.mesh.search._WORTH", 0)
     free = np.random.default_rng(3).random((40, 40)) > 0.2
     endpoints = [tuple(map(tuple, np.argwhere(free)[[k, -1 - k]].tolist())) for k in range(60)]

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 from hybridnav.search.directed import DirectedSides
-from hybridnav.search.mesh import (
-    DetourSearch,
-    MeshSearch,
-    build_mesh,
-    cells_across,
-    shortest_paths,
-)
+from hybridnav.search.mesh import DetourSearch, MeshSearch, build_mesh, cells_across, shortest_paths
 from tests.one_way import Scene, random_scene
 from tests.oracle.mesh import assert_sides_agree, twice_the_area
 from tests.oracle.one_way import OneWayPlane

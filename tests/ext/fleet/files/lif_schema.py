@@ -50,9 +50,7 @@ _EDGE = _object(
     ),
 )
 _STATION = _object(
-    ["stationId", "interactionNodeIds"],
-    stationId=TEXT,
-    interactionNodeIds=_list(TEXT, minItems=1),
+    ["stationId", "interactionNodeIds"], stationId=TEXT, interactionNodeIds=_list(TEXT, minItems=1)
 )
 SCHEMA = {
     "$schema": "http://json-schema.org/draft-07/schema#",

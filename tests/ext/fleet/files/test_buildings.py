@@ -281,7 +281,7 @@ def test_buildings_are_told_from_maps(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("compress", [False, True])
 @pytest.mark.parametrize("preset", ["shortest", "octile"])
-def test_a_model_answers_as_the_building(tmp_path: Path, preset: str, compress: bool) -> None:  # noqa: FBT001
+def test_a_model_answers_as_the_building(tmp_path: Path, preset: str, compress: bool) -> None:
     scene = random_building(5, preset=preset)
     scene.building.prepare()
     hn.save(scene.building, tmp_path / "b.hnm", compress=compress)

@@ -63,9 +63,7 @@ def test_everything_that_the_robot_can_reach_is_known(explored: Exploration) -> 
     assert known[~beside].mean() > 0.8  # the room without a door is not
 
 
-def test_the_robot_keeps_off_the_walls_and_drives_no_farther_than_it_says(
-    explored: Exploration,
-) -> None:
+def test_the_robot_keeps_off_the_walls_and_drives_no_farther_than_it_says(explored):
     plan = flat(radius_m=0.1)  # half the robot's radius: it knows walls to a cell or so
     assert (plan.classes[tuple(plan.frame.cells_of(explored.points).T)] == hn.CellClass.FREE).all()
     steps = np.hypot(*np.diff(explored.points, axis=0).T)

@@ -210,9 +210,7 @@ def test_the_topic_must_be_one_of_scans(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data())
 @settings(max_examples=examples(16), deadline=None)
-def test_maps_survive_a_round_trip(
-    tmp_path_factory: pytest.TempPathFactory, kind: str, data: st.DataObject
-) -> None:
+def test_maps_survive_a_round_trip(tmp_path_factory, kind, data):
     shape = data.draw(st.tuples(st.integers(1, 9), st.integers(1, 9)))
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
     percent = rng.integers(-1, 101, shape)
@@ -435,9 +433,7 @@ def test_what_cannot_be_written_is_refused_in_one_line(tmp_path: Path) -> None:
     assert not (tmp_path / "a.bag").exists()
 
 
-def test_without_rosbags_one_line_says_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_rosbags_one_line_says_how_to_get_it(tmp_path, monkeypatch):
     (tmp_path / "a.bag").write_bytes(b"")
     monkeypatch.setitem(sys.modules, "rosbags", None)
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)

@@ -61,9 +61,7 @@ def test_a_flaser_line_is_read(tmp_path: Path, *, packed: bool) -> None:
         (5, -90, 90),
     ],
 )
-def test_the_number_of_beams_tells_their_angles(
-    tmp_path: Path, count: int, first: float, last: float
-) -> None:
+def test_the_number_of_beams_tells_their_angles(tmp_path, count, first, last):
     (scan,) = log_of(tmp_path, flaser([2.0] * count))
     assert angles_of(scan) == pytest.approx((first, last))
 
@@ -242,9 +240,7 @@ def test_a_log_may_be_cut_off_anywhere_in_its_last_line(tmp_path: Path, line: st
 
 @given(noise=st.binary(max_size=300), at=st.integers(0, 200), packed=st.booleans())
 @settings(max_examples=examples(100))
-def test_any_bytes_end_in_scans_or_counts(
-    tmp_path_factory: pytest.TempPathFactory, *, noise: bytes, at: int, packed: bool
-) -> None:
+def test_any_bytes_end_in_scans_or_counts(tmp_path_factory, *, noise, at, packed):
     text = "".join(flaser(GOOD, time=k) for k in range(5)).encode()
     content = gzip.compress(text) if packed else text
     path = tmp_path_factory.mktemp("log") / "noise.log"

@@ -11,12 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
-from hybridnav.ext.live.mapping import (
-    LaserModel,
-    LaserScan,
-    Mapper,
-    ScanSequence,
-)
+from hybridnav.ext.live.mapping import LaserModel, LaserScan, Mapper, ScanSequence
 from tests.oracle.beams import kinds_of_cells
 from tests.strategies import examples
 
@@ -72,15 +67,9 @@ def expected_evidence(given_scans: list[LaserScan], model: LaserModel, side_m: f
     return evidence
 
 
-@given(
-    st.lists(scans(), min_size=1, max_size=4),
-    MODELS,
-    st.sampled_from([0.25, 0.3, 1.0]),
-)
+@given(st.lists(scans(), min_size=1, max_size=4), MODELS, st.sampled_from([0.25, 0.3, 1.0]))
 @settings(max_examples=examples(120))
-def test_every_cell_has_the_evidence_of_the_definition(
-    given_scans: list[LaserScan], model: LaserModel, side_m: float
-) -> None:
+def test_every_cell_has_the_evidence_of_the_definition(given_scans, model, side_m):
     mapper = Mapper(resolution_m=side_m, laser=model)
     for scan in given_scans:
         assert mapper.add(scan)
@@ -104,9 +93,7 @@ def test_every_cell_has_the_evidence_of_the_definition(
 
 @given(st.lists(scans(reach=60.0), min_size=1, max_size=5))
 @settings(max_examples=examples(60))
-def test_a_grid_that_grew_is_one_that_was_large_from_the_start(
-    given_scans: list[LaserScan],
-) -> None:
+def test_a_grid_that_grew_is_one_that_was_large_from_the_start(given_scans):
     grown = Mapper(resolution_m=0.25)
     large = Mapper(resolution_m=0.25)
     no_return = np.array([math.inf])
@@ -123,9 +110,7 @@ def test_a_grid_that_grew_is_one_that_was_large_from_the_start(
 
 
 @pytest.mark.parametrize(("hits_win", "between"), [(True, 0.95), (False, 0.19)])
-def test_a_scan_counts_once_for_a_cell_and_its_model_says_as_what(
-    *, hits_win: bool, between: float
-) -> None:
+def test_a_scan_counts_once_for_a_cell_and_its_model_says_as_what(*, hits_win, between):
     """Three beams along a row: two pass the cell in which the third one ends, to a wall."""
     scan = LaserScan(np.array([5.0, 3.0, 5.0]), (0.5, 0.5, 0.0), start_rad=0, step_rad=0)
     model = LaserModel(tolerance_m=0.0, hits_win=hits_win)
@@ -137,9 +122,7 @@ def test_a_scan_counts_once_for_a_cell_and_its_model_says_as_what(
 
 @given(st.lists(scans(), min_size=1, max_size=3), MODELS, st.floats(-7.0, 7.0))
 @settings(max_examples=examples(60))
-def test_a_turned_lattice_is_that_of_turned_scans(
-    given_scans: list[LaserScan], model: LaserModel, yaw_rad: float
-) -> None:
+def test_a_turned_lattice_is_that_of_turned_scans(given_scans, model, yaw_rad):
     """Odd places, so that rounding moves no end of a beam over a side of a cell."""
     corner, (cosine, sine) = (0.7, -3.1), (math.cos(yaw_rad), math.sin(yaw_rad))
     level = Mapper(resolution_m=0.25, laser=model)
@@ -227,9 +210,7 @@ def test_a_wrong_first_pose_does_not_cost_the_map() -> None:
 
 @given(st.lists(scans(reach=20.0), min_size=1, max_size=4), MODELS)
 @settings(max_examples=examples(60))
-def test_a_scan_changes_cells_of_its_area_alone(
-    given_scans: list[LaserScan], model: LaserModel
-) -> None:
+def test_a_scan_changes_cells_of_its_area_alone(given_scans, model):
     """The area lies on sides of cells, and shrinks to what the cells of the next grid need."""
     corner_m = (0.1, -0.2)
     mapper = Mapper(resolution_m=0.25, laser=model, corner_m=corner_m)
@@ -424,7 +405,5 @@ JUMP, BACK, OTHER = "pose jumps", "time runs back", "other number of beams"
         ([(0, 0, 5), (99, 1, 5), (-99, 2, 5), (0, 3, 5)], [None, JUMP, JUMP, None]),
     ],
 )
-def test_a_fault_costs_one_scan_and_a_new_beginning_holds(
-    scans: list[Short], expected: list[str | None]
-) -> None:
+def test_a_fault_costs_one_scan_and_a_new_beginning_holds(scans, expected):
     assert faults(*scans) == expected

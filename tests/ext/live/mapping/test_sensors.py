@@ -11,11 +11,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.ndimage import distance_transform_edt
 
 import hybridnav as hn
-from hybridnav.ext.live.mapping import (
-    LaserModel,
-    Mapper,
-    SimulatedLaser,
-)
+from hybridnav.ext.live.mapping import LaserModel, Mapper, SimulatedLaser
 from tests.layers import grid_of
 from tests.oracle.beams import position
 from tests.strategies import examples
@@ -41,16 +37,10 @@ def entry(cell: Any, start: Any, direction: Any) -> float:
 
 
 @given(
-    WORLDS,
-    st.floats(-1, 9),
-    st.floats(-1, 9),
-    st.floats(-4, 4),
-    st.sampled_from([0.0, 0.5, -2.0]),
+    WORLDS, st.floats(-1, 9), st.floats(-1, 9), st.floats(-4, 4), st.sampled_from([0.0, 0.5, -2.0])
 )
 @settings(max_examples=examples(150))
-def test_a_beam_runs_to_the_first_occupied_cell(
-    world: Any, row: float, col: float, heading: float, yaw: float
-) -> None:
+def test_a_beam_runs_to_the_first_occupied_cell(world, row, col, heading, yaw):
     frame = hn.Frame(0.5, (3.0, -2.0), yaw)
     grid = grid_of(np.where(world, 1.0, 0.0), frame, robot_radius_m=0)
     x, y = frame.points_of_grid([row, col]).tolist()
