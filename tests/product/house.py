@@ -29,9 +29,9 @@ _NO_CODE = {
 
 
 @cache
-def _tree(path: Path) -> ast.Module:
-    """Read a file once for all that is counted."""
-    return ast.parse(path.read_text())
+def _nodes(path: Path) -> list[ast.AST]:
+    """Read a file once for all that is counted; its module comes first."""
+    return [*ast.walk(ast.parse(path.read_text()))]
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,10 @@ class Source:
 
 def read(path: Path, root: Path = SRC) -> Source:
     text = path.read_text()
-    tree = _tree(path)
     prose: set[int] = set()
     importing: set[int] = set()
     names: set[str] = set()
-    for node in ast.walk(tree):
+    for node in _nodes(path):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             prose |= _span(node) if isinstance(node.value.value, str) else set()
         elif isinstance(node, ast.Import | ast.ImportFrom):
@@ -155,7 +154,7 @@ def bare_kernels() -> list[str]:
         tokens = list(tokenize.generate_tokens(StringIO(text).readline))
         comments = {one.start[0] for one in tokens if one.type == tokenize.COMMENT}
         written = {one.start[0] for one in tokens if one.type not in _NO_CODE}
-        for node in ast.walk(_tree(path)):
+        for node in _nodes(path):
             if isinstance(node, ast.FunctionDef) and node.end_lineno is not None:
                 first = node.body[0].end_lineno if ast.get_docstring(node) else node.lineno
                 body = set(range((first or 0) + 1, node.end_lineno + 1))
@@ -184,7 +183,7 @@ def floors_of(package: Path) -> int:
     """
     graph: nx.DiGraph[Path] = nx.DiGraph()
     for path in package.rglob("*.py"):
-        for node in ast.walk(_tree(path)):
+        for node in _nodes(path):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hybridnav."):
                 for alias in node.names:
                     other = _home(node.module or "", alias.name)
@@ -200,7 +199,7 @@ def _home(module: str, name: str) -> Path:
         return place / f"{name}.py"
     stub = place / "__init__.pyi"
     if stub.exists():
-        for node in ast.walk(_tree(stub)):
+        for node in _nodes(stub):
             if isinstance(node, ast.ImportFrom) and any(one.name == name for one in node.names):
                 return _home(".".join([module, *filter(None, [node.module])]), name)
     return place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
@@ -211,12 +210,12 @@ def unnamed() -> list[str]:
     words in a name begins a word there."""
     missing = []
     for stub in SRC.rglob("*.pyi"):
-        for node in ast.walk(_tree(stub)):
+        for node in _nodes(stub):
             if not isinstance(node, ast.ImportFrom) or node.level != 1 or not node.module:
                 continue
             path = stub.parent / f"{node.module.replace('.', '/')}.py"
             if path.exists():
-                head = (ast.get_docstring(_tree(path)) or "").partition("\n\n")[0]
+                head = (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n\n")[0]
                 missing += [
                     f"{path.relative_to(SRC)}: {alias.name}"
                     for alias in node.names
@@ -236,7 +235,7 @@ def _names_of_functions() -> Counter[str]:
     """Count the functions that name a value or a parameter so, those inside them apart."""
     count: Counter[str] = Counter()
     for path in SRC.rglob("*.py"):
-        for function in filter(_is_function, ast.walk(_tree(path))):
+        for function in filter(_is_function, _nodes(path)):
             waiting = [*ast.iter_child_nodes(function)]
             names = set()
             for node in waiting:
@@ -283,7 +282,7 @@ def figures(target: Path) -> dict[str, float]:
         ),
         "functions with a value called found": _names_of_functions()["found"],
         "functions with a value called known": _names_of_functions()["known"],
-        "lines of tests": sum(one.lines for one in sources(ROOT / "tests")),
+        "lines of tests": lines_of(ROOT / "tests"),
     }
 
 
