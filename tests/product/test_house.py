@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_476,
-    "lines": 103_069,
+    "code": 65_511,
+    "lines": 103_130,
     "files": 438,
-    "code outside ext": 50_419,
+    "code outside ext": 50_454,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -53,7 +53,7 @@ BUDGETS = {
     "refine": (6145, 9),
     "rooms": (5539, 8),
     "route": (1031, 6),
-    "search": (12560, 9),
+    "search": (12603, 9),
     "topology": (694, 6),
     "viz": (5309, 6),
 }

@@ -20,14 +20,13 @@ if TYPE_CHECKING:
 
 
 def near_sides(
-    inside: BoolArray, one_way: DirectedSides, origin: tuple[int, int]
+    framed: ByteArray, one_way: DirectedSides, origin: tuple[int, int]
 ) -> tuple[ByteArray, ByteArray, LongArray, LongArray]:
     """Return what sides with a direction forbid, by framed cell: moves, and moves backwards; and
     the flat cells beside the forbidden ones, and those of them where paths may turn."""
-    width = inside.shape[1] + 2
-    framed = np.zeros((inside.shape[0] + 2, width), np.bool_)
-    framed[1:-1, 1:-1] = inside
-    moves, steps = legal_moves(framed, False).ravel(), STEPS @ np.array([width, 1])
+    width = framed.shape[1]
+    is_free = framed.view(np.bool_)
+    moves, steps = legal_moves(is_free, False).ravel(), STEPS @ np.array([width, 1])
     rows, cols = np.divmod(one_way.forbidden[0], one_way.shape[1]) - np.array(origin)[:, None]
     is_in = (rows > 0) & (rows < len(framed) - 1) & (cols > 0) & (cols < width - 1)
     cells, masks = (rows * width + cols)[is_in], one_way.forbidden[1][is_in]
@@ -40,23 +39,29 @@ def near_sides(
         against[heads[-1]] |= np.uint8(1 << (k + 4 & 7))
     ends = np.unique(np.concatenate(heads))
     zone = np.unique(ends[:, None] + np.append(steps, 0))
-    zone = zone[framed.ravel()[zone]]
+    zone = zone[is_free.ravel()[zone]]
+    barred, against = barred.reshape(framed.shape), against.reshape(framed.shape)
     return barred, against, zone, zone[turning_cells(moves, width, zone)]
 
 
 def with_corners(
-    index: LongArray, corners: IntArray, kinds: ByteArray, near: Sequence[LongArray]
+    tables: tuple[LongArray, ByteArray],
+    corners: IntArray,
+    kinds: ByteArray,
+    near: Sequence[LongArray],
 ) -> tuple[IntArray, ByteArray]:
-    """Return the corner cells and their kinds with more of them, which the index is told.
+    """Return the corner cells and their kinds with more of them, which the tables are told.
 
+    `tables`: the index and the kinds by framed cell, see `number_cells`;
     `near`: the flat cells beside sides with a direction, whose kind is 0, and the corner cells
     among them.
     """
-    zone, turns = near
+    (index, stops), (zone, turns) = tables, near
     every = np.union1d(corners, turns).astype(np.int32)
     found = np.zeros(len(every), np.uint8)
     found[np.searchsorted(every, corners)] = kinds
     found[np.isin(every, zone)] = 0
+    stops.ravel()[turns] = 1
     np.bitwise_or.at(index[:, 1], turns >> 6, np.int64(1) << (turns & 63))
     before = np.searchsorted(every, np.arange(len(index)) << 6)
     index[:, 2] = index[:, 2] >> 32 << 32 | before

@@ -9,9 +9,6 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 
-BLOCKED = -1
-"""Number of cells that are not free."""
-
 
 @njit(cache=True, nogil=True, _nrt=False)
 def _n_bits(word):
@@ -49,121 +46,179 @@ def number_cells(free):
     A corner cell has a blocked cell at one of its corners, and both cells beside the blocked one
     are free: shortest paths turn there.
 
-    `free`: bool (rows, cols). Returns int32 ((rows + 2) * (cols + 2),), the number of each cell of
-    the framed grid, `BLOCKED` for none; int32 (n,), flat corner cells; uint8 (n,), which of their
-    corners are blocked, bit k for direction 2 * k + 1; the index, int64 (words, 3), which keeps the
-    numbers in 3 bits a cell: for every 64 flat cells which are free, which are corner cells, and
-    how many of each come before, free ones in the high half.
+    `free`: uint8 (rows, cols), 1 for free cells, in a frame of blocked ones. Returns uint8 (rows,
+    cols), which corners of a corner cell are blocked, bit k for direction 2 * k + 1, else 0; int32
+    (n,), the flat corner cells; uint8 (n,), their blocked corners; the index, int64 (words, 3),
+    which keeps the numbers in 3 bits a cell: for every 64 flat cells which are free, which are
+    corner cells, and how many of each come before, free ones in the high half.
     """
-    rows, cols = free.shape
-    width = cols + 2
-    number = np.full((rows + 2) * width, BLOCKED, np.int32)
-    n_cells = np.int32(0)
-    for row in range(rows):
-        at = (row + 1) * width + 1
-        for col in range(cols):
-            if free[row, col]:
-                number[at + col] = n_cells
-                n_cells += 1
-    index = np.zeros((number.size + 63 >> 6, 3), np.int64)
-    n_corners, n_free = 0, np.int64(0)
-    for cell in range(number.size):
-        if cell & 63 == 0:
-            index[cell >> 6, 2] = n_free << 32 | n_corners
-        if number[cell] != BLOCKED:
-            n_free += 1
-            index[cell >> 6, 0] |= np.int64(1) << (cell & 63)
-            if _kind(number, width, cell) != 0:
-                n_corners += 1
-                index[cell >> 6, 1] |= np.int64(1) << (cell & 63)
-    corners, kinds = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
+    kinds = np.zeros(free.shape, np.uint8)
+    for row in range(1, len(free) - 1):
+        _kinds(free[row], free[row - 1], kinds[row], 4, 8)
+        _kinds(free[row], free[row + 1], kinds[row], 2, 1)
+    flat, flat_kinds = free.reshape(-1), kinds.reshape(-1)
+    index = np.zeros((flat.size + 63 >> 6, 3), np.int64)
+    n_free = n_corners = np.int64(0)
+    for word in range(len(index)):
+        first = word << 6
+        is_free = is_turn = np.int64(0)
+        for k in range(min(64, flat.size - first)):
+            is_free |= np.int64(flat[first + k]) << k
+            is_turn |= np.int64(flat_kinds[first + k] != 0) << k
+        index[word, 0], index[word, 1] = is_free, is_turn
+        index[word, 2] = n_free << 32 | n_corners
+        n_free += _n_bits(is_free)
+        n_corners += _n_bits(is_turn)
+    corners, found = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
     n_corners = 0
-    for cell in range(number.size):
-        if is_corner(index, cell):
-            corners[n_corners], kinds[n_corners] = cell, _kind(number, width, cell)
-            n_corners += 1
-    return number, corners, kinds, index
+    for word in range(len(index)):
+        if index[word, 1] == 0:
+            continue
+        for cell in range(word << 6, min(word + 1 << 6, flat.size)):
+            if flat_kinds[cell] != 0:
+                corners[n_corners], found[n_corners] = cell, flat_kinds[cell]
+                n_corners += 1
+    return kinds, corners, found, index
+
+
+# Loops over one row are kernels of their own, without a branch and with indices from 0 on: so they
+# become vector instructions.
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _kind(number, width, cell):
-    """Return the corners of a free cell that are blocked while both cells beside them are free."""
-    east, north = number[cell + 1] != BLOCKED, number[cell + width] != BLOCKED
-    west, south = number[cell - 1] != BLOCKED, number[cell - width] != BLOCKED
-    kind = 0
-    if north and east and number[cell + width + 1] == BLOCKED:
-        kind |= 1
-    if north and west and number[cell + width - 1] == BLOCKED:
-        kind |= 2
-    if south and west and number[cell - width - 1] == BLOCKED:
-        kind |= 4
-    if south and east and number[cell - width + 1] == BLOCKED:
-        kind |= 8
-    return kind
+def _kinds(here, beside, kinds, west, east):
+    """Add the bits of cells of a row whose corner in the row beside it is blocked while both cells
+    beside that corner are free: `west` and `east`, by the side on which it is."""
+    before, middle, after = here[:-2], here[1:-1], here[2 : len(here)]
+    beside_before, beside_middle, beside_after = beside[:-2], beside[1:-1], beside[2 : len(beside)]
+    inner = kinds[1:-1]
+    for i in range(len(inner)):
+        is_open = middle[i] & beside_middle[i]
+        inner[i] |= (is_open & before[i] & (beside_before[i] ^ 1)) * west
+        inner[i] |= (is_open & after[i] & (beside_after[i] ^ 1)) * east
 
 
 @njit(cache=True, nogil=True)
-def look_ahead(number, width, index, ahead, barred):
+def look_ahead(free, stops, ahead, barred):
     """Fill in the distances ahead of each free cell in the eight directions.
 
-    `number`, `index`: results of `number_cells`; `width`: columns of the framed grid; `ahead`:
-    int16 or int32 (n_free, 8), filled in; `barred`: uint8 by framed cell, bit k for a move in
-    direction k that is illegal though its cells are free; empty for none. Along a side: the
-    distance to the next corner cell, or 0 or less, minus the free cells before a blocked one. Along
-    a diagonal: the distance to the next cell that is a corner cell or sees one along either side of
-    that diagonal, or minus the number of legal moves.
+    `free`: see `number_cells`; `stops`: uint8 (rows, cols), not 0 for corner cells; `ahead`: int16
+    or int32 (n_free, 8), filled in; `barred`: uint8 (rows, cols), bit k for a move in direction k
+    that is illegal though its cells are free; without rows for none. Along a side: the distance to
+    the next corner cell, or 0 or less, minus the free cells before a blocked one. Along a diagonal:
+    the distance to the next cell that is a corner cell or sees one along either side of that
+    diagonal, or minus the number of legal moves.
     """
-    # Sides come first, because they decide where a diagonal stops.
-    for flip in (1, -1):
-        first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
-        # Upwards, the cells to the west and south are done before; downwards, those to the north
-        # and east.
-        towards = ((4, -1), (6, -width)) if flip == 1 else ((0, 1), (2, width))
-        for cell in range(first, last, flip):
-            here = number[cell]
-            if here == BLOCKED:
-                continue
-            for k, step in towards:
-                there = number[cell + step]
+    rows, width = free.shape
+    nothing = np.zeros(width, np.uint8)
+    # Rows come first, because what a cell sees along a side decides where a diagonal stops.
+    east, west = np.zeros(width, ahead.dtype), np.zeros(width, ahead.dtype)
+    sees, events = np.zeros((2, rows, width), np.uint8), np.empty(width, np.int32)
+    first = np.zeros(rows + 1, np.int64)
+    for row in range(1, rows - 1):
+        here, n_before = free[row], first[row]
+        bar = barred[row] if len(barred) else nothing
+        _look_east(here[1:], stops[row, 1:], bar, east[:-1], events)
+        _look_west(here[:-1], stops[row, :-1], bar[1:], west[1:], events)
+        for col in range(width):
+            sees[0, row, col], sees[1, row, col] = east[col] > 0, west[col] > 0
+        for col in range(width):
+            if here[col]:
+                ahead[n_before, 0], ahead[n_before, 4] = east[col], west[col]
+                n_before += 1
+        first[row + 1] = n_before
+    # From row to row: each neighbour in the row before knows the way ahead.
+    for step in (-1, 1):
+        straight, to_east, to_west = (2, 1, 3) if step == 1 else (6, 7, 5)
+        before, found = np.zeros((3, width), ahead.dtype), np.zeros((3, width), ahead.dtype)
+        for k in range(1, rows - 1):
+            row = k if step == -1 else rows - 1 - k
+            here, there, stop = free[row], free[row + step], stops[row + step]
+            bar = (barred[row] if len(barred) else nothing)[1:-1]
+            own, near = (here[1:-1], bar, straight), (there[1:-1], stop[1:-1], before[0, 1:-1])
+            _look_straight(own, near, found[0, 1:-1])
+            look = stop[2:], sees[0, row + step, 2:], before[0, 2:], before[1, 2:]
+            square = here[1:-1], there[1:-1], here[2:], there[2:]
+            _look_aslant(square, bar, to_east, look, found[1, 1:-1])
+            look = stop[:-2], sees[1, row + step, :-2], before[0, :-2], before[2, :-2]
+            square = here[1:-1], there[1:-1], here[:-2], there[:-2]
+            _look_aslant(square, bar, to_west, look, found[2, 1:-1])
+            n_before = first[row]
+            for col in range(width):
+                if here[col]:
+                    ahead[n_before, straight] = found[0, col]
+                    ahead[n_before, to_east] = found[1, col]
+                    ahead[n_before, to_west] = found[2, col]
+                    n_before += 1
+            before, found = found, before
 
-                # The neighbour knows the way ahead: one move more, and its sign stays.
-                if there == BLOCKED or (barred.size > 0 and barred[cell] >> k & 1):
-                    ahead[here, k] = 0
-                elif is_corner(index, cell + step):
-                    ahead[here, k] = 1
-                else:
-                    seen = ahead[there, k]
-                    ahead[here, k] = seen + 1 if seen > 0 else seen - 1
 
-    # In the same two orders, each diagonal neighbour is done before.
-    for flip in (1, -1):
-        first, last = (0, number.size) if flip == 1 else (number.size - 1, -1)
-        diagonals = (
-            ((5, -1, -width), (7, 1, -width)) if flip == 1 else ((1, 1, width), (3, -1, width))
-        )
-        for cell in range(first, last, flip):
-            here = number[cell]
-            if here == BLOCKED:
-                continue
-            for k, along_row, along_col in diagonals:
-                there = number[cell + along_row + along_col]
-                if (
-                    there == BLOCKED
-                    or number[cell + along_row] == BLOCKED
-                    or number[cell + along_col] == BLOCKED
-                    or (barred.size > 0 and barred[cell] >> k & 1)
-                ):
-                    ahead[here, k] = 0
-                elif (
-                    is_corner(index, cell + along_row + along_col)
-                    or ahead[there, k - 1] > 0
-                    or ahead[there, k + 1 & 7] > 0
-                ):
-                    # A path may turn off the diagonal where a side leads to a corner cell.
-                    ahead[here, k] = 1
-                else:
-                    seen = ahead[there, k]
-                    ahead[here, k] = seen + 1 if seen > 0 else seen - 1
+@njit(cache=True, nogil=True, _nrt=False)
+def _look_west(free, stops, bar, found, events):
+    """Fill in the distances to the west of the cells of a row by what lies west of each.
+
+    An event is a cell where the look ends: twice its place, and 1 more if it is a corner cell that
+    is not barred. Each cell sees the event with the highest number before it.
+    """
+    for i in range(len(found)):
+        is_open = free[i] & ~(bar[i] >> 4) & 1
+        events[i] = np.int32(2 * i + is_open) * np.int32(is_open ^ 1 | (stops[i] != 0))
+    last = np.int32(0)
+    for i in range(len(found)):
+        last = max(last, events[i])
+        events[i] = last
+    for i in range(len(found)):
+        at = events[i] >> 1
+        found[i] = i + 1 - at if events[i] & 1 else at - i
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def _look_east(free, stops, bar, found, events):
+    """Fill in the distances to the east of the cells of a row by what lies east of each; see
+    `_look_west`."""
+    n = len(found)
+    for i in range(n):
+        is_open = free[i] & ~bar[i] & 1
+        is_event = is_open ^ 1 | (stops[i] != 0)
+        events[i] = np.int32(2 * i + is_open) if is_event else np.int32(2 * n)
+    last = np.int32(2 * n)
+    for i in range(n):
+        last = min(last, events[n - 1 - i])
+        events[n - 1 - i] = last
+    for i in range(n):
+        at = events[i] >> 1
+        found[i] = at + 1 - i if events[i] & 1 else i - at
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def _look_straight(own, near, found):
+    """Fill in the distances of a row towards the row before it: one move more than from there, and
+    its sign stays.
+
+    `own`: which cells are free, what is barred there, and the direction; `near`: which cells of the
+    row before are free, which of them stop a look, and their distances.
+    """
+    (is_free, bar, k), (is_free_there, stops, before) = own, near
+    for i in range(len(found)):
+        seen = before[i] + 1 if before[i] > 0 else before[i] - 1
+        seen = 1 if stops[i] else seen
+        found[i] = seen if is_free[i] & is_free_there[i] & ~(bar[i] >> k) & 1 else 0
+
+
+@njit(cache=True, nogil=True, _nrt=False)
+def _look_aslant(square, bar, k, look, found):
+    """Fill in the distances of a row along a diagonal towards the row before it.
+
+    `square`: which of the four cells of a move are free; `bar`: what is barred; `k`: the direction;
+    `look`: of the cells where these moves end, which stop a look, which see a corner cell along
+    their row, and their distances straight on and aslant.
+    """
+    (one, two, three, four), (stops, sees, straight, before) = square, look
+    for i in range(len(found)):
+        seen = before[i] + 1 if before[i] > 0 else before[i] - 1
+        # A path may turn off the diagonal where a side leads to a corner cell.
+        seen = 1 if ((stops[i] | sees[i]) != 0) | (straight[i] > 0) else seen
+        found[i] = seen if one[i] & two[i] & three[i] & four[i] & ~(bar[i] >> k) & 1 else 0
 
 
 @njit(cache=True, nogil=True)
