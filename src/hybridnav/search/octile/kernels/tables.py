@@ -61,24 +61,24 @@ def number_cells(free):
     n_free = n_corners = np.int64(0)
     for word in range(len(index)):
         first = word << 6
-        is_free = is_turn = np.int64(0)
+        free_bits = corner_bits = np.int64(0)
         for k in range(min(64, flat.size - first)):
-            is_free |= np.int64(flat[first + k]) << k
-            is_turn |= np.int64(flat_kinds[first + k] != 0) << k
-        index[word, 0], index[word, 1] = is_free, is_turn
+            free_bits |= np.int64(flat[first + k]) << k
+            corner_bits |= np.int64(flat_kinds[first + k] != 0) << k
+        index[word, 0], index[word, 1] = free_bits, corner_bits
         index[word, 2] = n_free << 32 | n_corners
-        n_free += _n_bits(is_free)
-        n_corners += _n_bits(is_turn)
-    corners, found = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
+        n_free += _n_bits(free_bits)
+        n_corners += _n_bits(corner_bits)
+    corners, blocked = np.empty(n_corners, np.int32), np.empty(n_corners, np.uint8)
     n_corners = 0
     for word in range(len(index)):
         if index[word, 1] == 0:
             continue
         for cell in range(word << 6, min(word + 1 << 6, flat.size)):
             if flat_kinds[cell] != 0:
-                corners[n_corners], found[n_corners] = cell, flat_kinds[cell]
+                corners[n_corners], blocked[n_corners] = cell, flat_kinds[cell]
                 n_corners += 1
-    return kinds, corners, found, index
+    return kinds, corners, blocked, index
 
 
 # Loops over one row are kernels of their own, without a branch and with indices from 0 on: so they
@@ -130,53 +130,53 @@ def look_ahead(free, stops, ahead, barred):
     # From row to row: each neighbour in the row before knows the way ahead.
     for step in (-1, 1):
         straight, to_east, to_west = (2, 1, 3) if step == 1 else (6, 7, 5)
-        before, found = np.zeros((3, width), ahead.dtype), np.zeros((3, width), ahead.dtype)
+        before, distances = np.zeros((3, width), ahead.dtype), np.zeros((3, width), ahead.dtype)
         for k in range(1, rows - 1):
             row = k if step == -1 else rows - 1 - k
             here, there, stop = free[row], free[row + step], stops[row + step]
             bar = (barred[row] if len(barred) else nothing)[1:-1]
             own, near = (here[1:-1], bar, straight), (there[1:-1], stop[1:-1], before[0, 1:-1])
-            _look_straight(own, near, found[0, 1:-1])
+            _look_straight(own, near, distances[0, 1:-1])
             look = stop[2:], sees[0, row + step, 2:], before[0, 2:], before[1, 2:]
             square = here[1:-1], there[1:-1], here[2:], there[2:]
-            _look_aslant(square, bar, to_east, look, found[1, 1:-1])
+            _look_aslant(square, bar, to_east, look, distances[1, 1:-1])
             look = stop[:-2], sees[1, row + step, :-2], before[0, :-2], before[2, :-2]
             square = here[1:-1], there[1:-1], here[:-2], there[:-2]
-            _look_aslant(square, bar, to_west, look, found[2, 1:-1])
+            _look_aslant(square, bar, to_west, look, distances[2, 1:-1])
             n_before = first[row]
             for col in range(width):
                 if here[col]:
-                    ahead[n_before, straight] = found[0, col]
-                    ahead[n_before, to_east] = found[1, col]
-                    ahead[n_before, to_west] = found[2, col]
+                    ahead[n_before, straight] = distances[0, col]
+                    ahead[n_before, to_east] = distances[1, col]
+                    ahead[n_before, to_west] = distances[2, col]
                     n_before += 1
-            before, found = found, before
+            before, distances = distances, before
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _look_west(free, stops, bar, found, events):
+def _look_west(free, stops, bar, distances, events):
     """Fill in the distances to the west of the cells of a row by what lies west of each.
 
     An event is a cell where the look ends: twice its place, and 1 more if it is a corner cell that
     is not barred. Each cell sees the event with the highest number before it.
     """
-    for i in range(len(found)):
+    for i in range(len(distances)):
         is_open = free[i] & ~(bar[i] >> 4) & 1
         events[i] = np.int32(2 * i + is_open) * np.int32(is_open ^ 1 | (stops[i] != 0))
     last = np.int32(0)
-    for i in range(len(found)):
+    for i in range(len(distances)):
         last = max(last, events[i])
         events[i] = last
-    for i in range(len(found)):
+    for i in range(len(distances)):
         at = events[i] >> 1
-        found[i] = i + 1 - at if events[i] & 1 else at - i
+        distances[i] = i + 1 - at if events[i] & 1 else at - i
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _look_east(free, stops, bar, found, events):
+def _look_east(free, stops, bar, distances, events):
     """Fill in the distances to the east of the cells of a row by what lies east of each; see
     `_look_west`."""
-    n = len(found)
+    n = len(distances)
     for i in range(n):
         is_open = free[i] & ~bar[i] & 1
         is_event = is_open ^ 1 | (stops[i] != 0)
@@ -187,11 +187,11 @@ def _look_east(free, stops, bar, found, events):
         events[n - 1 - i] = last
     for i in range(n):
         at = events[i] >> 1
-        found[i] = at + 1 - i if events[i] & 1 else i - at
+        distances[i] = at + 1 - i if events[i] & 1 else i - at
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _look_straight(own, near, found):
+def _look_straight(own, near, distances):
     """Fill in the distances of a row towards the row before it: one move more than from there, and
     its sign stays.
 
@@ -199,14 +199,14 @@ def _look_straight(own, near, found):
     row before are free, which of them stop a look, and their distances.
     """
     (is_free, bar, k), (is_free_there, stops, before) = own, near
-    for i in range(len(found)):
+    for i in range(len(distances)):
         seen = before[i] + 1 if before[i] > 0 else before[i] - 1
         seen = 1 if stops[i] else seen
-        found[i] = seen if is_free[i] & is_free_there[i] & ~(bar[i] >> k) & 1 else 0
+        distances[i] = seen if is_free[i] & is_free_there[i] & ~(bar[i] >> k) & 1 else 0
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _look_aslant(square, bar, k, look, found):
+def _look_aslant(square, bar, k, look, distances):
     """Fill in the distances of a row along a diagonal towards the row before it.
 
     `square`: which of the four cells of a move are free; `bar`: what is barred; `k`: the direction;
@@ -214,11 +214,11 @@ def _look_aslant(square, bar, k, look, found):
     their row, and their distances straight on and aslant.
     """
     (one, two, three, four), (stops, sees, straight, before) = square, look
-    for i in range(len(found)):
+    for i in range(len(distances)):
         seen = before[i] + 1 if before[i] > 0 else before[i] - 1
         # A path may turn off the diagonal where a side leads to a corner cell.
         seen = 1 if ((stops[i] | sees[i]) != 0) | (straight[i] > 0) else seen
-        found[i] = seen if one[i] & two[i] & three[i] & four[i] & ~(bar[i] >> k) & 1 else 0
+        distances[i] = seen if one[i] & two[i] & three[i] & four[i] & ~(bar[i] >> k) & 1 else 0
 
 
 @njit(cache=True, nogil=True)
