@@ -185,7 +185,6 @@ def test_a_kill_leaves_a_whole_journal_and_no_lock(tmp_path: Path) -> None:
     Journal(file).close("link:lift", why="before")
     for turn in range(5):
         writer = subprocess.Popen([sys.executable, "-c", _WRITER, file], stdout=subprocess.PIPE)
-        assert writer.stdout is not None
         assert writer.stdout.readline() == b"ready\n"
         time.sleep(0.02 + 0.03 * turn)
         writer.send_signal(signal.SIGKILL)

@@ -205,7 +205,6 @@ def test_closed_cells_hold_directions_and_join_them() -> None:
     both = line | back | ClosedCells(np.array([0]))
     assert both.meets(east, grid)
     assert not both.meets(east + np.array([1, 0]), grid)
-    assert both.one_way is not None
     assert both.one_way.parts["line 1"].tolist() == [0, 1, 2]
     query = Query(((1, 1), (1, 2)), (np.zeros(2), np.zeros(2)), both)
     assert query.one_way is both.one_way

@@ -36,7 +36,6 @@ class Cheapest(GridAstar):
         return answer
 
     def cost_m(self, cells: Any) -> float:
-        assert self.layer is not None
         return self.layer.cost_of_cells(cells) * self.grid.resolution_m
 
 

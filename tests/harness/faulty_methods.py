@@ -157,7 +157,6 @@ class MissingDoor(SoundPlaces):
     """Two places beside each other are not known to be: no path from one to the other."""
 
     def solve(self, start: Cell, goal: Cell) -> MethodResult:
-        assert self.region_of is not None
         if self.region_of[start] == self.region_of[goal]:
             return super().solve(start, goal)
         return MethodResult(None)
@@ -213,7 +212,6 @@ class PlansForAll(PlansAlone):
     """Regions of start and goal for each pair, joined or not."""
 
     def solve(self, start: Cell, goal: Cell) -> MethodResult:
-        assert self.region_of is not None
         ends = int(self.region_of[start]), int(self.region_of[goal])
         return MethodResult(None, nodes=tuple(dict.fromkeys(ends)))
 

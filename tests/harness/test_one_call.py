@@ -39,7 +39,6 @@ def test_its_losses_are_those_of_the_chart_and_of_notebooks(study: hn.harness.St
     assert list(study.losses) == study.labels
     assert max(study.losses["shortest"]) < 1e-6
     legend = plot_losses(study).get_legend()
-    assert legend is not None
     assert len(legend.get_texts()) == 4
     assert hn.plot(study).get_xlabel() == "loss in per cent"
     assert "<pre>method" in str(study._repr_html_())

@@ -26,7 +26,6 @@ def folder(planner: hn.HybridPlanner, tmp_path: Path) -> Path:
     place.mkdir()
     for number, (start, goal) in enumerate(ENDS):
         path = planner.plan(start, goal).path
-        assert path is not None
         points = path.points
         if number == 2:
             points = np.insert(points, 1, [points[0] + [0.4, 0.0], points[0]], axis=0)

@@ -58,7 +58,6 @@ def test_what_is_dropped_is_counted(classes, least_m2):
         assert left.dropped is None
         return
     counted, before, after = left.dropped, grid.classes, left.classes
-    assert counted is not None
     areas = np.bincount(ndimage.label(before == FREE)[0].ravel())[1:]
     assert counted.free == np.count_nonzero(areas < least_m2)
     assert counted.free_cells == np.count_nonzero((before == FREE) & (after != FREE))

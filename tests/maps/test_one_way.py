@@ -67,7 +67,6 @@ def test_files_and_models_keep_rules(rooms, tmp_path: Path) -> None:
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(grid, rooms=labels))
     hn.save(topology, tmp_path / "m.hnm")
     kept = hn.load(tmp_path / "m.hnm").rooms
-    assert kept is not None
     assert kept.one_way == labels.one_way
 
 

@@ -190,7 +190,6 @@ class Verdict:
 
 def judged(topology: hn.TopologicalMap, result: hn.PlanResult) -> Verdict:
     """Compare the words of a path with its doors."""
-    assert result.path is not None
     walk = Walk(topology, result.path.points)
     told = result.instructions
     passages = [one for one in walk.passages() if not _is_by_sight(told, _instruction(told, one))]

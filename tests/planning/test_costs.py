@@ -117,7 +117,6 @@ def test_without_obstacles_and_costs_the_finish_is_the_straight_line() -> None:
     layer = layer_of(np.ones(grid.shape))
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
     result = planner.plan((1.2, 2.3), (37.1, 20.4), smooth="line-of-sight")
-    assert result.path is not None
     assert result.path.points.tolist() == [[1.2, 2.3], [37.1, 20.4]]
     assert result.gap == pytest.approx(0, abs=1e-9)
 
@@ -139,7 +138,7 @@ def test_the_preset_names_clearance_and_results_record_it() -> None:
     layer = hn.CostLayer.clearance(grid, multiplier=4.0)
     by_layer = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
     first, second = (p.plan((2.0, 2.2), (6.0, 2.2)) for p in (by_preset, by_layer))
-    assert first.cost == second.cost > first.raise_for_status().path.length_m  # type: ignore[union-attr]
+    assert first.cost == second.cost > first.raise_for_status().path.length_m
     source = {
         "kind": "clearance",
         "inflation_radius_m": 0.7,
@@ -154,7 +153,6 @@ def test_the_preset_names_clearance_and_results_record_it() -> None:
     assert answer["length_m"] < answer["cost"]
     assert answer["settings"]["costs"] == source
     both = hn.HybridPlanner(topology, preset=preset, costs=layer_of(np.full(grid.shape, 2.0)))
-    assert both.costs is not None
     assert (both.costs.factors == np.maximum(layer.factors, 2)).all()
 
 
@@ -166,8 +164,6 @@ def test_a_cheaper_route_takes_the_wide_door() -> None:
     cheapest = hn.HybridPlanner(topology, preset="grid-astar", costs=layer).plan(
         (3.0, 2.25), (5.0, 2.25)
     )
-    assert shortest.path is not None
-    assert cheapest.path is not None
     assert shortest.path.points[:, 1].max() < 2.6
     assert cheapest.path.points[:, 1].max() > 4.0
     assert shortest.path.length_m < cheapest.path.length_m
@@ -200,7 +196,6 @@ def test_the_corridor_of_paper_is_searched_by_costs() -> None:
         assert result.metric == "weighted"
         assert result.lower_bound <= least.cost * (1 + 1e-9)
         assert result.cost >= least.cost * (1 - 1e-9)
-        assert result.path is not None
         assert result.cost == pytest.approx(cost_along(grid, layer, result.path.points))
 
 
@@ -214,7 +209,6 @@ def test_cells_that_costs_close_are_blocked_for_all_queries() -> None:
     assert planner.plan((0.5, 0.5), (4.5, 4.5)).status is hn.PlanStatus.GOAL_BLOCKED
     for smooth in ("none", "line-of-sight"):
         result = planner.plan((1.5, 4.5), (7.5, 4.5), smooth=smooth)
-        assert result.path is not None
         assert not closed[tuple(result.path.cells.T)].any()
         shut = grid_of(closed.astype(float), robot_radius_m=0)
         assert segment_faults(shut, result.path.points) == ()
@@ -235,7 +229,6 @@ def test_tours_choose_the_cells_of_rooms_by_costs_and_sum_them() -> None:
     layer = layer_of(factors)
     planner = hn.HybridPlanner(topology, preset="grid-astar", costs=layer)
     result = planner.plan("west", "east")
-    assert result.path is not None
     assert set(result.path.cells[:, 0]) == {16}
     assert result.cost == 11.0
     tour = hn.plan_tour(planner, [(5.5, 3.5), "east", (5.5, 18.5)])
@@ -293,5 +286,4 @@ def test_a_corridor_that_costs_close_is_left_as_one_that_is_blocked_is() -> None
         start, goal, blocked={"cells": np.argwhere(closed)}
     )
     assert shut.solved
-    assert shut.path is not None
     assert shut.path.length_m == pytest.approx(blocked.cost)

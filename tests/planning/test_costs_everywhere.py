@@ -172,7 +172,6 @@ def plan_tour(scene: Scene, preset: str, _tmp: Any) -> None:
 
 def named_rooms(scene: Scene, preset: str, _tmp: Any) -> None:
     rooms = scene.topology.pyramid.rooms
-    assert rooms is not None
     name = rooms.names[-1]
     inside = (rooms.label_of == len(rooms.names) - 1) & scene.grid.enterable()
     start = scene.pairs[0][0]

@@ -37,7 +37,6 @@ def topology_of(occupied: Any) -> hn.TopologicalMap:
 def poses_of(result: hn.PlanResult, *, reverses: bool = False) -> Any:
     """Poses of a path, judged: turns and drives alone, which touch no wall by shapely's word."""
     assert result.status is hn.PlanStatus.SOLVED
-    assert result.path is not None
     assert result.path.headings_rad is not None
     poses = np.column_stack([result.path.points, result.path.headings_rad])
     assert_turns_and_drives(poses, reverses=reverses)
@@ -73,7 +72,6 @@ def test_every_planner_of_the_space_goes_through_doors_without_touching(rooms, p
     if result.status is hn.PlanStatus.APPROXIMATE:  # the budget is of wall time, beside other jobs
         result = planner_of(rooms, *settings, budget_s=60).plan(start, goal)
     poses = poses_of(result, reverses=reverses)
-    assert result.refinement is not None
     assert not result.refinement.by_grid
     np.testing.assert_allclose(poses[0], start, atol=1e-6)
     np.testing.assert_allclose(poses[-1], goal, atol=1e-6)

@@ -174,7 +174,6 @@ def planner_of(
 
 def bodies_of(result: hn.PlanResult, footprint: Any = CART) -> Any:
     """Outlines of the robot along a path of turns and drives, 2 cm and 0.02 rad apart."""
-    assert result.path is not None
     headings: Any = result.path.headings_rad
     poses = np.column_stack([result.path.points, headings])
     dense = []
@@ -197,7 +196,6 @@ def walls_of(grid: hn.OccupancyGrid) -> Any:
 
 
 def by(result: hn.PlanResult) -> str:
-    assert result.refinement is not None
     return result.refinement.by
 
 
@@ -212,11 +210,11 @@ def test_a_result_says_which_of_the_three_answered(rooms: hn.OccupancyGrid, spac
     made = planner_of(rooms, space=space)
     inside = made.plan((2.0, 2.0, 0.5), (4.5, 4.5, 2.0))
     assert (by(inside), inside.gap) == ("circumscribed disc", 0.0)
-    assert inside.refinement.steps == ("circumscribed disc: solved",)  # type: ignore[union-attr]
+    assert inside.refinement.steps == ("circumscribed disc: solved",)
     through = made.plan(*ENDS)
     assert through.solved
     assert by(through) == "OMPL"
-    assert through.refinement.steps[0] == "circumscribed disc: no path"  # type: ignore[union-attr]
+    assert through.refinement.steps[0] == "circumscribed disc: no path"
     for result in (inside, through):
         shortest = hn.HybridPlanner(made.topology).plan(result.start[:2], result.goal[:2])  # type: ignore[index]
         assert result.lower_bound == pytest.approx(min(shortest.cost, result.cost))
@@ -245,7 +243,7 @@ def test_a_way_round_of_the_large_disc_counts_only_where_ompl_finds_none_shorter
     ends = (4.5, 1.2, 0.0), (7.5, 1.2, 0.0)
     short = planner_of(grid).plan(*ends)
     assert by(short) == "OMPL"
-    assert "over the bound" in short.refinement.steps[0]  # type: ignore[union-attr]
+    assert "over the bound" in short.refinement.steps[0]
     assert short.cost < 3.3
     hasty = planner_of(grid, "planner=BITstar", "budget_s=0.01", "confine=mask").plan(*ends)
     assert hasty.solved
@@ -305,7 +303,6 @@ def test_an_obstacle_of_one_query_holds_for_the_whole_robot_and_a_keepout_for_it
     assert within.status is hn.PlanStatus.START_BLOCKED
     kept = made.plan(start, goal, blocked={"keepout": [pallet]})
     assert kept.solved
-    assert kept.path is not None
     assert not shapely.LineString(kept.path.points).intersects(pallet.buffer(-0.05))
     assert kept.cost <= result.cost
 
@@ -350,7 +347,6 @@ def test_a_footprint_honours_costs_masks_and_keepouts(rooms: hn.OccupancyGrid, s
     for start, goal in ends:
         result, short = made.plan(start, goal), plain.plan(start, goal, blocked=shut)
         assert result.solved
-        assert result.path is not None
         assert short.path is not None
         answered.add(by(result))
         assert result.metric == "any-angle-weighted"

@@ -238,7 +238,6 @@ def test_the_picture_of_a_named_plan_shows_its_paths_stops_rooms_and_scale(plann
     paths = by_gid(ax, "path")
     assert len(paths) == 2
     for line, result in zip(paths, tour.results, strict=True):
-        assert result.path is not None
         assert np.allclose(np.column_stack(line.get_data()), result.path.points)
     endpoints = [np.column_stack(waypoint.get_data()) for waypoint in by_gid(ax, "waypoints")]
     assert np.allclose(endpoints[0], [[0.75, 4.25], [5.75, 4.25]])

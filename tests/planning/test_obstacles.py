@@ -39,7 +39,6 @@ def pallet_cells(grid: hn.OccupancyGrid) -> Any:
 
 def distance_m(result: hn.PlanResult) -> float:
     """How far from the pallet the robot's centre passes it."""
-    assert result.path is not None
     line = shapely.LineString(result.path.poses(0.02)[:, :2])
     return float(shapely.distance(line, shapely.box(*PALLET)))
 

@@ -156,7 +156,7 @@ def test_the_whole_map_and_the_places_are_corridors_too(office):
         preset = load_preset("ompl", overrides=[f"planner.along={coarse}"])
         result = hn.HybridPlanner(office, preset=preset).plan(*ENDS)
         assert result.solved
-        assert segment_faults(office.grid, result.path.points) == ()  # type: ignore[union-attr]
+        assert segment_faults(office.grid, result.path.points) == ()
         assert result.route is not None
 
 
@@ -199,7 +199,6 @@ def test_a_long_robot_goes_through_doors_without_touching(rooms, space, planner)
     start, goal = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)
     result = made.plan(start, goal)
     assert result.status is hn.PlanStatus.SOLVED
-    assert result.refinement is not None
     assert not result.refinement.by_grid
     path: Any = result.path
     assert result.metric == ("any-angle" if space == "se2" else space)
@@ -268,7 +267,7 @@ def test_an_approximate_path_is_never_reported_as_solved(rooms: hn.TopologicalMa
     assert result.status in {hn.PlanStatus.APPROXIMATE, hn.PlanStatus.TIMEOUT}
     assert not result.solved
     assert (result.cost, math.isnan(result.gap)) == (math.inf, True)
-    assert [step.partition(":")[0] for step in result.refinement.steps] == [  # type: ignore[union-attr]
+    assert [step.partition(":")[0] for step in result.refinement.steps] == [
         "circumscribed disc",
         "corridor",
         "widened corridor",
@@ -363,7 +362,6 @@ def test_words_and_route_are_those_of_the_path_that_ompl_found() -> None:
     made = hn.HybridPlanner(topology, preset=preset)
     tour = hn.plan_tour(made, [(5.5, 2.2, 1.57), (7.5, 2.4, 1.57)])
     result = tour.results[0]
-    assert result.refinement is not None
     assert result.refinement.steps[-1] == "widened corridor: solved"
     path: Any = result.path
     (side,) = np.flatnonzero(np.diff(np.sign(path.points[:, 0] - 6.1)))
@@ -383,7 +381,7 @@ def test_a_heading_of_half_a_turn_is_a_heading_like_others(rooms: hn.Topological
     made = long_robot(rooms, "se2", "planner: RRTConnect, budget_s: 2")
     result = made.plan((3.0, 3.0, math.pi), (17.0, 9.0, -math.pi))
     assert result.solved
-    assert not result.refinement.by_grid  # type: ignore[union-attr]
+    assert not result.refinement.by_grid
 
 
 @pytest.mark.parametrize(
@@ -412,7 +410,6 @@ def test_cost_and_bound_of_short_curves_are_those_of_their_points(space, start, 
     preset = load_preset("ompl", overrides=overrides)
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(empty))
     result = hn.HybridPlanner(topology, preset=preset).plan(start, goal)
-    assert result.path is not None
     assert result.cost == pytest.approx(length_m, abs=1e-9)
     assert result.cost == pytest.approx(result.path._motion.lengths_m.sum(), abs=1e-9)
     assert math.dist(start[:2], goal[:2]) - 1e-12 <= result.lower_bound <= result.cost

@@ -100,7 +100,6 @@ def test_the_section_goes_with_its_refiner_and_single_keys_can_be_set() -> None:
         "ompl",
         overrides=["planner.ompl.planner=BITstar", "planner.ompl.parameters.rewire_factor=1.5"],
     )
-    assert preset.planner.ompl is not None
     assert preset.planner.ompl.parameters == {"rewire_factor": 1.5}
     plain = load_preset("octile", overrides=["planner.method=ompl"])
     assert plain.planner.ompl == OmplSettings()
@@ -116,7 +115,6 @@ def test_the_section_goes_with_its_refiner_and_single_keys_can_be_set() -> None:
 def test_settings_that_go_only_together_are_checked_together(order: tuple[int, int]) -> None:
     given = ["planner.ompl.space=dubins", "planner.ompl.turning_radius_m=0.8"]
     preset = load_preset("ompl", overrides=[given[index] for index in order])
-    assert preset.planner.ompl is not None
     assert (preset.planner.ompl.space, preset.planner.ompl.turning_radius_m) == ("dubins", 0.8)
     with pytest.raises(hn.errors.PresetError, match="dubins or reeds-shepp needs turning_radius_m"):
         load_preset("ompl", overrides=given[:1])

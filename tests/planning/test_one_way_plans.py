@@ -186,7 +186,6 @@ def test_near_goals_and_closed_starts_obey() -> None:
     into_west = hn.OneWay(sides=[(1, 7, 1, 6), (7, 7, 7, 6)])
     found = planner.plan((2.5, 4.5), (8.5, 4.5), one_way=into_west, within_m=5)
     assert found.status is hn.PlanStatus.NEAR_GOAL
-    assert found.path is not None
     assert found.path.points[-1, 0] <= 7
     zone = hn.Blocked(cells=[(row, col) for row in range(9) for col in (7, 8, 9)])
     out = hn.OneWay(sides=[(row, 9, row, 10) for row in range(9)])
@@ -209,7 +208,6 @@ def test_ompl_goes_in_by_one_door_and_out_by_the_other() -> None:
     sides = both.on(topology.grid)
     for start, goal in (((6.5, 7.4), (8.5, 7.4)), ((8.5, 1.5), (6.5, 1.5))):
         path = planner.plan(start, goal, one_way=both).raise_for_status().path
-        assert path is not None
         ends = topology.grid.frame.cell_of(*start), topology.grid.frame.cell_of(*goal)
         line = on_grain(path.points, topology.grid.frame, topology.grid.shape)
         assert wrong_at(sides, topology.grid.enterable(), line, ends) is None

@@ -107,7 +107,6 @@ def test_a_preset_plans_by_the_method_that_it_names(topology: hn.TopologicalMap)
 def test_closed_cells_are_kept_to_whatever_the_method_does(topology: hn.TopologicalMap) -> None:
     planner = planner_of(topology, "ByCells")
     open_path = planner.plan(START, GOAL).path
-    assert open_path is not None
     middle = open_path.cells[len(open_path.cells) // 2]
     closed = {"cells": [tuple(map(int, middle))]}
     around = planner.plan(START, GOAL, blocked=closed)
@@ -160,7 +159,6 @@ def test_an_answer_that_is_none_is_refused(topology, answer, shown, monkeypatch)
 @pytest.mark.parametrize("metric", ["octile", "any-angle"])
 def test_a_path_without_a_bound_is_not_called_optimal(topology, metric, monkeypatch):
     found = hn.HybridPlanner(topology, preset="grid-astar").plan(START, GOAL)
-    assert found.path is not None
     length_m = found.path.length_m
     answer = Found(found.path.cells, length_m, 0.0, found.path.points)
     monkeypatch.setattr(Faulty, "answer", answer)
@@ -187,7 +185,6 @@ def test_a_path_at_any_angle_through_closed_cells_is_refused(topology, monkeypat
     monkeypatch.setattr(ByCells, "metric", "any-angle")
     planner = planner_of(topology, "ByCells")
     path = planner.plan(START, GOAL).path
-    assert path is not None
     cell = tuple(map(int, path.cells[len(path.cells) // 2]))
     with pytest.raises(hn.errors.PresetError, match="a path through closed cells"):
         planner.plan(START, GOAL, blocked={"cells": [cell]})

@@ -59,7 +59,6 @@ def test_a_path_from_a_point_to_itself_is_that_point_alone(preset: str) -> None:
     for query, end in ((0, start), (2, goal)):
         assert batch.path(query).tolist() == [end.tolist()]
         alone = planner.plan(end, end).path
-        assert alone is not None
         assert alone.points.tolist() == [end.tolist()]
     assert len(batch.path(1)) > 1
 
@@ -147,4 +146,4 @@ def test_costs_that_are_not_the_length_of_their_points_are_refused(monkeypatch, 
     with pytest.raises(hn.errors.InvalidValueError, match=r"states a length of .* of its points"):
         planner.plan_many(*ends)
     with pytest.raises(hn.errors.InvalidValueError, match=r"states a length of .* of its points"):
-        _ = planner.plan(ends[0][0], ends[1][0]).path.points  # type: ignore[union-attr]
+        _ = planner.plan(ends[0][0], ends[1][0]).path.points

@@ -102,7 +102,6 @@ def test_unexplored_cells_are_entered_when_the_preset_says_so(preset: str) -> No
     allowing = hn.load_preset(preset, overrides=["planner.allow_unexplored=true"])
     planner = hn.HybridPlanner(map_of(MIXED), preset=allowing)
     result = planner.plan((0.5, 0.5), (5.5, 2.5)).raise_for_status()
-    assert result.path is not None
     assert_legal(result.path.cells, MIXED != CellClass.OCCUPIED)
     assert result.cost == pytest.approx(3 + 2 * math.sqrt(2), abs=1e-12)
     assert planner.plan((2.5, 0.5), (3.5, 1.5)).solved
@@ -165,7 +164,6 @@ def test_a_turned_and_shifted_frame_changes_the_points_alone(preset: str, yaw_ra
     planner = hn.HybridPlanner(map_of(grid, merge_distance_m=0.3), preset=preset)
     start, goal = centre(grid, (0, 1)), centre(grid, (4, 7))
     path = planner.plan(start, goal).raise_for_status().path
-    assert path is not None
     assert path.cells[[0, -1]].tolist() == [[0, 1], [4, 7]]
     assert path.points == pytest.approx(
         np.array([centre(grid, (row, col)) for row, col in path.cells.tolist()]), abs=1e-12
@@ -180,10 +178,8 @@ def test_a_turned_and_shifted_frame_changes_the_points_alone(preset: str, yaw_ra
 def test_within_one_cell_there_is_nothing_to_go_and_nothing_to_prove(preset: str) -> None:
     result = hn.HybridPlanner(map_of(OPEN), preset=preset).plan((3.1, 2.2), (3.9, 2.8))
     assert result.solved
-    assert result.path is not None
     assert result.path.points.tolist() == [[3.5, 2.5]]
     assert result.path.length_m == result.cost == result.lower_bound == result.gap == 0
-    assert result.route is not None
     assert len(result.route.places) == 1
     assert result.route.arcs == ()
 
@@ -297,7 +293,6 @@ def test_of_two_doors_between_two_rooms_the_nearer_one_is_taken() -> None:
         endpoints = centre(grid, (3, 0)), centre(grid, (3, 8))
         for start, goal in (endpoints, endpoints[::-1]):
             route = planner.plan(start, goal).raise_for_status().route
-            assert route is not None
             assert level.through_m[route.arcs[0]] == level.through_m.min()
             if level.through_m[0] != level.through_m[1]:
                 taken.add(route.arcs)
@@ -311,7 +306,6 @@ def test_the_two_regions_of_figure_1_meet_along_two_arcs() -> None:
     )
     planner = hn.HybridPlanner(topology, preset=WITH_UNEXPLORED)
     result = planner.plan((0.15, 1.5), (3.85, 1.5)).raise_for_status()
-    assert result.route is not None
     (arc,) = result.route.arcs
     parallel = (np.sort(topology.arcs) == np.sort(topology.arcs[arc])).all(axis=1)
     assert parallel.sum() == 2
@@ -410,7 +404,6 @@ def test_a_result_is_json(build, goal, preset, seconds):
         return
     assert read["length_m"] == result.path.length_m
     assert read["points"] == pytest.approx(result.path.points, abs=1e-6)
-    assert result.route is not None
     assert read["places"] == list(result.route.places)
     assert read["arcs"] == list(result.route.arcs)
     assert read["headings_rad"] == pytest.approx(result.path.headings_at_points, abs=1e-6)
@@ -436,7 +429,6 @@ def test_numbers_of_numpy_give_the_answers_of_plain_ones() -> None:
 def test_results_are_values_that_nobody_can_change() -> None:
     planner = hn.HybridPlanner(map_of(SEALED))
     result = planner.plan((0.5, 0.5), (8.5, 0.5))
-    assert result.path is not None
     assert result.route is not None
     for value, name in ((result, "status"), (result.path, "length_m"), (result.route, "arcs")):
         with pytest.raises(dataclasses.FrozenInstanceError):

@@ -77,7 +77,6 @@ def test_a_way_through_the_second_part_of_an_own_room_opens_no_other_private_roo
     for pair in ((start, goal), (goal, start)):
         visitor = hn.under(drawn(ink), "visitor")
         path = visitor.plan(*pair).path
-        assert path is not None
         assert "B" not in {ink[::-1][row][col] for row, col in path.cells.tolist()}
         shut = hn.under(drawn((*ink[:4], "#hhhh##kk#", ink[5])), "visitor")
         assert shut.plan(*pair).solved, "B must be crossed, for there is no other way"
@@ -153,7 +152,6 @@ def test_costs_and_corridors_are_factors_of_metres() -> None:
     assert result.metric == "weighted"
     assert result.gap == pytest.approx(0.0, abs=1e-12)
     layer = visitor.costs
-    assert layer is not None
     label_of = planner.topology.rooms.labels.label_of
     factors = {name: layer.factors[label_of == at] for at, name in enumerate(NAMES)}
     assert set(factors["hall"]) == {1.0}
@@ -201,7 +199,6 @@ def test_uses_are_read_written_and_kept(tmp_path: Path) -> None:
     assert hn.load_rooms(file, grid).uses == labels.uses
     hn.save(planner, tmp_path / "clinic.hnm")
     kept = hn.load(tmp_path / "clinic.hnm").rooms
-    assert kept is not None
     assert kept.uses == labels.uses
     # A use that a program changes is changed in the text, and comments stay.
     text = file.read_text().replace("- name: bath", "# mine\n- name: bath")

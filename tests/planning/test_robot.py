@@ -112,7 +112,6 @@ def test_bends_in_the_open_are_arcs() -> None:
     grid = grid_of(probability, hn.Frame(0.05), robot_radius_m=0.25)
     planner = hn.HybridPlanner(topology_of(grid), preset="robot")
     result = planner.plan((1.0, 1.0), (4.0, 1.0))
-    assert result.path is not None
     assert len(result.path.spot_turns) == 0
     poses = result.path.poses()
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= 0.05 + 1e-9
@@ -128,7 +127,6 @@ def test_where_no_arc_fits_the_robot_turns_on_the_spot() -> None:
     preset = hn.load_preset("robot", overrides=["planner.turning_radius_m=2"])
     planner = hn.HybridPlanner(topology_of(grid), preset=preset)
     result = planner.plan((1.5, 1.5), (10.5, 10.5))
-    assert result.path is not None
     spots = result.path.spot_turns
     assert len(spots) == 1
     assert result.path.max_curvature_per_m == 0

@@ -109,8 +109,6 @@ def test_the_hybrid_planner_solves_what_is_connected_and_its_paths_are_legal(dat
 def judge(result: hn.PlanResult, site: KnownMap, pair: Cells) -> None:
     """Assert what a user may take for granted of a solved plan."""
     path, route, topology = result.path, result.route, site.topology
-    assert path is not None
-    assert route is not None
     assert path.cells[[0, -1]].tolist() == pair.tolist()
     # A corridor has the fields of the route's places, of those that touch it twice, and no other.
     places = np.searchsorted(topology.place_ids, route.places)

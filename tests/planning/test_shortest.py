@@ -42,14 +42,12 @@ def assert_optimal(grid: hn.OccupancyGrid, result: hn.PlanResult, optimum_m: flo
         assert result.status is hn.PlanStatus.NO_PATH
         assert result.lower_bound == math.inf
         return
-    assert result.path is not None
     assert result.gap == 0
     # Far from the origin coordinates are rounded more coarsely.
     assert result.cost == pytest.approx(optimum_m, rel=1e-9, abs=1e-7)
     assert not segment_faults(grid, result.path.points)
     cells = result.path.cells
     assert np.abs(np.diff(cells, axis=0)).max(initial=0) <= 1
-    assert result.route is not None
     assert len(result.route.arcs) == len(result.route.places) - 1
 
 
@@ -241,7 +239,6 @@ def test_a_planner_builds_at_its_first_query_and_once_for_all_threads(preset, bu
 def test_a_path_from_a_point_to_itself_is_that_point() -> None:
     for smooth in (None, "none", "line-of-sight"):
         result = shortest(mapped(drawn("..."))).plan((1.2, 0.3), (1.2, 0.3), smooth=smooth)
-        assert result.path is not None
         assert result.path.points.tolist() == [[1.2, 0.3]]
         assert (result.cost, result.lower_bound, result.gap) == (0, 0, 0)
 

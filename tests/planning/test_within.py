@@ -81,7 +81,6 @@ def test_the_path_ends_at_the_nearest_point_of_the_free_space_that_is_reached(
         return
     assert str(found.status) == "near the goal"
     assert not found.solved
-    assert found.path is not None
     assert found.goal == tuple(goal.tolist())
     end = shapely.Point(found.path.points[-1])
     # Paths of cells end at the centre of a cell, as for every goal.

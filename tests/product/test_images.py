@@ -96,7 +96,6 @@ def test_counts_in_the_prose_are_those_of_the_office() -> None:
     counts = re.match(
         r"(\d+) vertices, (\d+) arcs.* (\d+) parallel arcs and (\d+) self-", str(dropped)
     )
-    assert counts is not None
     places, arcs, parallel, loops = counts.groups()
     assert f"become {places} places]" in page("pyramid.md")
     assert f"drops {parallel} arcs and {loops} self-loops of {arcs}." in page("pyramid.md")

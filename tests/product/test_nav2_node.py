@@ -110,7 +110,6 @@ def test_a_path_is_that_of_the_planner(actions: Any, node: Any) -> None:
     poses = result.path.poses
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(node.planner.grid)))
     expected = planner.plan(start, end).path
-    assert expected is not None
     turns = [2 * math.atan2(pose.pose.orientation.z, pose.pose.orientation.w) for pose in poses]
     # The robot turns on the spot at the start, from its yaw, and at the goal, to that of the goal.
     assert (turns[0], turns[-1]) == pytest.approx((START_YAW, GOAL_YAW))

@@ -520,7 +520,6 @@ def test_no_bound_of_a_line_by_costs_is_above_the_cheapest_path_by_brute_force()
     for _ in range(12):
         grid = random_grid(rng, (9, 10))
         planner = planner_of(grid, "robot")
-        assert planner.costs is not None
         oracle = SidePoints(grid.enterable(), planner.costs.factors)
         for pair in points_in(grid, rng, 3):
             result = planner.plan(*pair)

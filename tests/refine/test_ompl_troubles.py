@@ -110,7 +110,7 @@ def test_trouble_before_a_path_costs_the_time_at_most_and_the_grid_takes_over(
     assert min(spent) <= 1.1 * BUDGET_S
     assert max(spent) <= 1.5 * BUDGET_S
     troubled(None)
-    assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
+    assert planner.plan(*ENDS).refinement.by_grid is False
 
 
 @pytest.mark.parametrize("trouble", list(REASONS))
@@ -268,7 +268,7 @@ def test_queries_of_two_threads_do_not_mix(planner: hn.HybridPlanner) -> None:
             assert plan.path is not None
             found.append((endpoints, plan.path.points[[0, -1]].tolist()))
 
-    cells_of = {endpoints: planner.plan(*endpoints).path.cells for endpoints in (ENDS, other)}  # type: ignore[union-attr]
+    cells_of = {endpoints: planner.plan(*endpoints).path.cells for endpoints in (ENDS, other)}
     threads = [threading.Thread(target=ask, args=(endpoints,)) for endpoints in (ENDS, other)]
     for thread in threads:
         thread.start()
@@ -295,7 +295,7 @@ def test_a_fork_has_a_worker_of_its_own_and_leaves_that_of_its_parent(
         os._exit(code)
     assert os.waitpid(child, 0)[1] == 0
     assert worker_of(planner)._running.process.pid == before
-    assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
+    assert planner.plan(*ENDS).refinement.by_grid is False
 
 
 def test_who_ignores_the_ends_of_children_gets_answers_too() -> None:
@@ -347,9 +347,9 @@ def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(
     with monkeypatch.context() as patched:
         patched.setattr("hybridnav.refine.ompl.client._START_S", 0.0)
         late = planner.plan(*ENDS)
-    assert "is not ready" in late.refinement.steps[0]  # type: ignore[union-attr]
+    assert "is not ready" in late.refinement.steps[0]
     planner.close()
-    assert planner.plan(*ENDS).refinement.by_grid is False  # type: ignore[union-attr]
+    assert planner.plan(*ENDS).refinement.by_grid is False
 
 
 @pytest.mark.parametrize("dies", [False, True])

@@ -283,7 +283,6 @@ def test_the_hybrid_planner_solves_them_too_and_its_bounds_hold(data: Path, name
         scenario = problem.scenario
         start, goal = grid.frame.points_of([scenario.start, scenario.goal])
         result = planner.plan(start, goal).raise_for_status()
-        assert result.path is not None
         assert_legal(result.path.cells, grid.classes == CellClass.FREE)
         assert result.cost == pytest.approx(recounted(result.path.cells), rel=1e-12)
         assert result.cost >= scenario.optimum_cells - problem.slack

@@ -40,7 +40,6 @@ def test_each_floor_has_a_panel_and_the_highest_is_on_top() -> None:
     for ax, number in ((low, 0), (high, 1)):
         (line,) = [child for child in ax.lines if child.get_gid() == "route-1"]
         path = plan.results[number].path
-        assert path is not None
         np.testing.assert_array_equal(line.get_xydata(), path.points)
         assert {"link-west lift", "link-B"} <= set(gids(ax))
     words = {text.get_gid(): text.get_text() for text in low.texts if text.get_gid()}
@@ -66,7 +65,6 @@ def test_floors_that_no_route_visits_are_strips() -> None:
     assert not {"cells", "route-1"} & set(gids(high))
     (mark,) = [line for line in high.lines if line.get_gid() == "link-B"]
     end = building.link("B").end_on("2")
-    assert end is not None
     assert mark.get_xdata() == [end.position_m[0]]
     assert high.get_ylim()[0] < float(np.ravel(mark.get_ydata())[0]) < high.get_ylim()[1]
     low, high = plot_building(building)
@@ -78,7 +76,6 @@ def test_alternatives_have_a_line_each_and_none_is_needed() -> None:
     found = building.alternatives(("1", (1.5, 3.5)), ("2", (1.5, 4.5)), 2, max_stretch=9.0)
     axes = plot_building(building, found)
     legend = axes[0].get_legend() or axes[1].get_legend()
-    assert legend is not None
     texts = [text.get_text() for text in legend.get_texts()]
     assert len(set(texts)) == len(texts)
     assert {"lift", "stairs", "rooms", "occupied"} <= set(texts)

@@ -65,7 +65,6 @@ def test_marks_of_methods_that_lose_as_much_stand_side_by_side(tmp_path):
     losses = {name: np.zeros(50) for name in "abcd"} | {"e": np.full(50, 0.1)}
     ax = plot_losses(losses)
     legend = ax.get_legend()
-    assert legend is not None
     legend.remove()
     save_figure(ax, tmp_path / "losses.png", dpi=200)
     pixels = np.rint(255 * imread(tmp_path / "losses.png")[..., :3])

@@ -172,7 +172,6 @@ def test_a_search_is_drawn_where_it_was_and_only_its_corridor_is_tinted(figure1)
     search = Search(states=[(0.5, 0.5), (0.9, 0.7)], edges=[(0.5, 0.5, 0.9, 0.7)])
     planner = hn.HybridPlanner(hn.TopologicalMap(figure1), preset="grid-astar")
     path = planner.plan((0.5, 0.5), (0.9, 0.7)).path
-    assert path is not None
     ax = plot_search(grid, search, corridor=corridor, path=path)
     assert points(ax, "states") == {(0.5, 0.5), (0.9, 0.7)}
     np.testing.assert_allclose(found(ax, "motions").get_segments(), [[[0.5, 0.5], [0.9, 0.7]]])

@@ -143,7 +143,6 @@ def test_labels_of_start_and_goal_keep_off_a_straight_path():
     planner = hn.HybridPlanner(hn.TopologicalMap(hn.DualGraphPyramid.build(grid)))
     for start, goal in (((3.0, 3.0), (12.0, 3.0)), ((12.0, 2.0), (3.0, 2.5)), ((7, 1), (7, 5))):
         result = planner.plan(start, goal)
-        assert result.path is not None
         assert len(result.path.points) == 2
         ax = plot_plan(planner.topology, result)
         renderer = FigureCanvasAgg(ax.get_figure(root=True)).get_renderer()
@@ -288,7 +287,6 @@ def test_dearer_cells_are_darker_and_walls_stay_visible() -> None:
     assert wall < dear < mild < plain
     assert colour_at(ax, 10, 4) not in ([255, 255, 255], colour_at(ax, 8, 22))
     legend = ax.get_legend()
-    assert legend is not None
     labels = [text.get_text() for text in legend.get_texts()]
     assert labels == ["occupied", "within 0.1 m of occupied", "closed", "a path"]
     assert ax.get_title() == "room  ·  metres cost 1 to 3 times as much"
@@ -304,7 +302,6 @@ def test_the_bar_states_factors_inside_the_figure(most: float, label: str) -> No
     figure.canvas.draw()
     bar = ax.child_axes[0]
     box, whole = bar.get_tightbbox(), figure.bbox
-    assert box is not None
     assert whole.x0 <= box.x0 < box.x1 <= whole.x1
     assert whole.y0 <= box.y0 < box.y1 < ax.get_window_extent().y0
     texts = [tick.get_text() for tick in bar.get_xticklabels()]

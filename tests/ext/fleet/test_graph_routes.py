@@ -246,10 +246,10 @@ def test_floors_in_one_frame_are_moved_back_to_their_maps(seed: int) -> None:
     for name, floor in here.floors.items():
         stops = [link for link in building.links if link.end_on(name) is not None]
         # One stop shifts a floor; how it was turned, nobody can know.
-        if len(stops) != 1 and len({link.end_on(name).position_m for link in stops}) > 1:  # type: ignore[union-attr]
+        if len(stops) != 1 and len({link.end_on(name).position_m for link in stops}) > 1:
             assert np.allclose(there.floors[name].graph.points, floor.graph.points, atol=1e-9)
         for link in there.links:
             if len(stops) == 1 and link.drawn == moved.links[building.links.index(stops[0])]:
-                assert link.ends[name] == pytest.approx(stops[0].end_on(name).position_m)  # type: ignore[union-attr]
+                assert link.ends[name] == pytest.approx(stops[0].end_on(name).position_m)
     assert scene.building is there.building
     assert check_building_graph(here).matched is here

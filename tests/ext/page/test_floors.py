@@ -65,7 +65,6 @@ def test_a_plan_over_floors_is_that_of_the_library(building: Client, folder: Pat
     for part, result, floor in zip(found["parts"], plan.results, own.floors, strict=True):
         rows_and_cols = np.array(part["line"])[:, ::-1]
         points = floor.planner.grid.frame.points_of_grid(rows_and_cols)
-        assert result.path is not None
         np.testing.assert_allclose(points, result.path.points, atol=1e-3)
     assert [ride["link"] for ride in found["rides"]] == [ride.link.name for ride in plan.rides]
     assert [line["text"] for line in found["words"]] == plan.words()
@@ -115,7 +114,7 @@ def test_names_are_saved_to_the_file_of_their_floor(building: Client, folder: Pa
     assert building.post("floor/1/save", {"version": 1}).value["notice"] == "saved to rooms-2.yaml"
     assert (folder / "rooms.yaml").read_bytes() == ground
     own = _own(folder)
-    assert set(own.floors[1].rooms.names) == {"e", "f", "attic", "h"}  # type: ignore[union-attr]
+    assert set(own.floors[1].rooms.names) == {"e", "f", "attic", "h"}
     goal = {"floor": 1, "point": [20.5, 8.5]}
     words = building.post("plan", QUERY | {"goal": goal}).value["words"]
     assert "attic" in " ".join(line["text"] for line in words)
@@ -197,7 +196,6 @@ def test_files_of_a_building(building: Client, folder: Path, tmp_path: Path) -> 
     for number, result in enumerate(plan.results):
         content = building.post("export/path-geojson", QUERY | {"floor": number}).body
         line = shapely.geometry.shape(json.loads(content)["features"][0]["geometry"])
-        assert result.path is not None
         np.testing.assert_allclose(line.coords, result.path.points, atol=1e-6)
         rooms = json.loads(building.post(f"floor/{number}/export/rooms", None).body)
         names = [f["properties"].get("room") for f in rooms["features"]]
@@ -222,7 +220,6 @@ def test_a_model_says_beforehand_that_it_saves_no_rooms_and_how_to_keep_them(fol
     assert sorted(tmp_path.iterdir()) == before
     out.write_bytes(content)
     rooms = hn.ext.fleet.load_building(out).floors[1].rooms
-    assert rooms is not None
     assert set(rooms.names) == {"attic", "f", "g", "h"}
 
 

@@ -109,7 +109,6 @@ def test_a_killed_server_loses_no_names(folder: Path) -> None:
     settings = ["--no-browser", "--robot-radius", "0.2"]
     with subprocess.Popen([*command, *settings], stdout=subprocess.PIPE, text=True) as server:
         try:
-            assert server.stdout is not None
             address = server.stdout.readline().split()[1]
             host, token = address.removeprefix("http://").rstrip("/").split("/")
             _wait_until_ready(host, token)

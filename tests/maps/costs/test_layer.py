@@ -126,7 +126,6 @@ def test_speed_masks_cost_the_time_that_they_take() -> None:
 def test_keepout_masks_close_cells_and_weigh_lanes() -> None:
     grid = grid_of(np.zeros((1, 5)), robot_radius_m=0)
     layer = hn.CostLayer.keepout_mask(grid, [[0, 20, 99, 100, -1]])
-    assert layer.keepout is not None
     # round(2.54 * 20) = 51, round(2.54 * 99) = 251, 254 is lethal.
     assert layer.keepout.tolist() == [[False, False, False, True, False]]
     assert layer.closed_flat.tolist() == [3]
@@ -157,7 +156,6 @@ def test_layers_are_joined_and_record_their_sources() -> None:
         (first * second, [[4, 3, 3]], "product"),
     ):
         assert joined.factors.tolist() == expected
-        assert joined.closed is not None
         assert joined.closed.tolist() == [[True, False, True]]
         assert joined.source == {"kind": kind, "of": [{"kind": "array"}] * 2}
     assert len((first | second | first).source["of"]) == 3
@@ -241,7 +239,6 @@ def test_a_changed_layer_differs_in_the_box_alone() -> None:
     expected = old.factors.copy()
     expected[1:3, 4:7] = part.factors
     np.testing.assert_array_equal(new.factors, expected)
-    assert old.closed is not None
     closed = old.closed.copy()
     closed[1:3, 4:7] = part.closed
     np.testing.assert_array_equal(new.closed, closed)

@@ -85,7 +85,6 @@ def test_masks_become_layers_of_the_map(tmp_path: Path) -> None:
     expected = np.repeat([1, 2, 100 / 11, 10, 1, 1, 1, 1, 1, 1, 1, 1], 2)
     assert np.abs(slow.factors - expected).max() < 2**-14
     zones = hn.load_keepout_mask(path, grid)
-    assert zones.keepout is not None
     assert zones.keepout.any(axis=0).tolist() == np.repeat(np.array(GREYS) == 100, 2).tolist()
 
 
@@ -145,7 +144,6 @@ def test_messages_warn_as_files_do(of: Any, pose: Any, words: str) -> None:
 def test_the_frame_of_the_mask_has_a_pose() -> None:
     # Half a turn about (4, 1): the last cell of the mask lies on the first one of the map.
     layer = filter_costs(GRID, info(0, 0, 1), MASK, pose=(4.0, 1.0, math.pi))
-    assert layer.keepout is not None
     assert layer.keepout.tolist() == [[True, False, False, False]]
 
 
@@ -286,7 +284,6 @@ def test_limits_are_those_of_the_speed_filter(value, base, multiplier, unit, ful
 def test_a_mask_may_have_another_size_in_the_frame_of_the_map() -> None:
     grid = grid_of(np.zeros((2, 4)), hn.Frame(0.5, (1.0, 1.0)), robot_radius_m=0)
     small = hn.CostLayer.keepout_mask(grid, [[0, 100]], grid.frame)
-    assert small.keepout is not None
     assert small.keepout.tolist() == [[False, True, False, False], [False] * 4]
     with pytest.raises(hn.errors.InvalidValueError, match="give the frame of the mask"):
         hn.CostLayer.keepout_mask(grid, [[0, 100]])
@@ -299,7 +296,6 @@ def test_no_thin_zone_of_a_fine_mask_is_lost_between_centres(offset: float) -> N
     line = np.zeros((20, 20), np.int8)
     line[:, 5 + round(offset * 10)] = 100
     layer = hn.CostLayer.keepout_mask(grid, line, hn.Frame(0.1))
-    assert layer.keepout is not None
     assert layer.keepout.tolist() == [[False, True, False, False]] * 4
 
 
@@ -369,8 +365,6 @@ def test_every_preset_keeps_out(floor: Any, preset: str) -> None:
     plain = planner.plan(START, GOAL)
     around = planner.plan(START, GOAL, blocked=hn.load_blocked(path, grid, keepout=True, pose=POSE))
     planner.close()
-    assert plain.path is not None
-    assert around.path is not None
     assert plain.path.points[:, 1].max() < 1.2  # by the lower doorway
     assert around.path.points[:, 1].max() > 2.2  # by the upper one
     if not around.path.is_curved:
@@ -385,7 +379,6 @@ def test_presets_with_costs_take_the_mask_as_costs(floor: Any, preset: str) -> N
     layer = hn.load_keepout_mask(path, grid, pose=POSE)
     settings_ = hn.load_preset(preset, overrides=["pyramid.robot_radius_m=0.1"])
     result = hn.HybridPlanner(topology, preset=settings_, costs=layer).plan(START, GOAL)
-    assert result.path is not None
     assert result.path.points[:, 1].max() > 2.2
     cells = grid.frame.cells_of(result.path.poses(0.02)[:, :2])
     assert not shut_of(grid)[tuple(cells.T)].any()
