@@ -222,52 +222,6 @@ def test_small_places_are_planned_from_blocks_above_them() -> None:
     assert found.expanded_fields <= 64  # of 3,600 places
 
 
-@given(
-    scenes(),
-    st.integers(0, 2**32 - 1),
-    st.sampled_from(["", "unexplored", "costs", "both"]),
-    st.sampled_from(["descent", "places"]),
-)
-@settings(max_examples=examples(200))
-def test_paper_is_right_with_closures_costs_and_unexplored_cells(scene, seed, kind, levels):
-    unexplored, by_costs = kind in {"unexplored", "both"}, kind in {"costs", "both"}
-    rng = np.random.default_rng(seed)
-    grid = scene.grid
-    allowed = f"planner.allow_unexplored={str(unexplored).lower()}"
-    overrides = [allowed, "planner.field_cells=4", f"planner.levels={levels}"]
-    factors = rng.uniform(1, 3, grid.shape)
-    closed = rng.random(grid.shape) < 0.1
-    costs = hn.CostLayer(factors, closed=closed) if by_costs else None
-    preset = hn.load_preset("paper", overrides=overrides)
-    topology = hn.TopologicalMap(scene.pyramid("radius"))
-    planner = hn.HybridPlanner(topology, preset=preset, costs=costs)
-    enterable = grid.classes != CellClass.OCCUPIED if unexplored else grid.classes == CellClass.FREE
-    if by_costs:
-        enterable = enterable & ~closed
-    assume(enterable.any())
-    for _ in range(3):
-        shut = rng.random(grid.shape) < 0.15
-        ends = [tuple(cell) for cell in rng.choice(np.argwhere(enterable), 2).tolist()]
-        if shut[ends[0]] or shut[ends[1]]:
-            continue
-        left = enterable & ~shut
-        optimum = distances(move_graph(left), grid.shape, ends[0])[ends[1]]
-        points = grid.frame.points_of(np.array(ends))
-        result = planner.plan(*points, blocked={"cells": np.argwhere(shut & enterable)})
-        assert result.solved is bool(np.isfinite(optimum))
-        if result.path is None:
-            continue
-        assert_legal(result.path.cells, left)
-        assert result.lower_bound <= result.cost * (1 + 1e-12)
-        least = optimum * grid.resolution_m
-        if by_costs:
-            whole = hn.HybridPlanner(
-                topology, preset=hn.load_preset("grid-astar", overrides=overrides[:1]), costs=costs
-            )
-            least = whole.plan(*points, blocked={"cells": np.argwhere(shut & enterable)}).cost
-        assert result.lower_bound == pytest.approx(least, rel=1e-9)
-
-
 @given(scenes(), HOW, st.integers(0, 2**32 - 1))
 @settings(max_examples=examples(100))
 def test_a_watched_descent_narrows_to_its_path(scene: Any, how: Any, seed: int) -> None:

@@ -80,8 +80,11 @@ def test_a_picture_that_lacks_something_does_not(name, setting, value, tmp_path,
 @pytest.mark.parametrize("name", PICTURES)
 def test_axes_given_are_axes_returned_and_settings_stay(name):
     before = dict(mpl.rcParams)
-    ax = Figure(figsize=(4, 3)).add_subplot()
+    figure = Figure(figsize=(4, 3))
+    ax, other = figure.subplots(1, 2)
     assert PICTURES[name](ax) is ax
+    assert figure.axes == [ax, other]
+    assert tuple(figure.get_size_inches()) == (4, 3)
     assert dict(mpl.rcParams) == before
 
 
@@ -117,13 +120,18 @@ def test_every_picture_can_be_drawn_on_axes_given():
         assert [parameter.default for parameter in given] == [None], name
 
 
-def test_drawing_leaves_pyplot_alone():
+def test_drawing_and_saving_leave_pyplot_and_settings_alone(tmp_path):
     code = (
-        "import sys\n"
+        "import sys, matplotlib as mpl\n"
         "from matplotlib.figure import Figure\n"
+        "from hybridnav.viz import save_figure\n"
         "from tests.viz.pictures import PICTURES\n"
+        "kept = ['font.size', 'pdf.fonttype', 'svg.hashsalt']\n"
+        "before = [mpl.rcParams[key] for key in kept]\n"
         "for plot in PICTURES.values():\n"
-        "    plot(Figure().add_subplot())\n"
+        "    picture = plot(Figure().add_subplot())\n"
+        f"save_figure(picture, {str(tmp_path / 'a.svg')!r})\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
+        "assert [mpl.rcParams[key] for key in kept] == before\n"
     )
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
