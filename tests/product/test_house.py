@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_511,
-    "lines": 103_130,
+    "code": 65_528,
+    "lines": 103_163,
     "files": 438,
-    "code outside ext": 50_454,
+    "code outside ext": 50_471,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -45,15 +45,15 @@ BUDGETS = {
     "graphs": (6570, 6),
     "guide": (3589, 10),
     "harness": (9443, 8),
-    "maps": (5304, 6),
+    "maps": (5321, 6),
     "models": (2113, 6),
-    "planning": (6856, 9),
+    "planning": (6863, 9),
     "pyramid": (4296, 9),
     "reasons": (1176, 6),
-    "refine": (6145, 9),
+    "refine": (6138, 9),
     "rooms": (5539, 8),
     "route": (1031, 6),
-    "search": (12603, 9),
+    "search": (12608, 9),
     "topology": (694, 6),
     "viz": (5309, 6),
 }

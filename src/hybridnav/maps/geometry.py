@@ -19,6 +19,7 @@ from hybridnav.maps.kernels import (
     polyline_length,
     polyline_lengths,
     position_of,
+    positions_on_grain,
     walks_clear,
 )
 
@@ -33,6 +34,7 @@ __all__ = [
     "polyline_length",
     "polyline_lengths",
     "position_of",
+    "positions_on_grain",
     "walks_clear",
 ]
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
+from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.trig import hypot
 
 
@@ -84,6 +85,22 @@ def position_of(x, y, frame):
     along, across = x - frame.x, y - frame.y
     row = (frame.cosine * across - frame.sine * along) / frame.resolution
     return row, (frame.cosine * along + frame.sine * across) / frame.resolution
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def positions_on_grain(points, frame, rows, cols):
+    """Return points as positions on the grain of exact tests, those beyond the map on its rim.
+
+    `points`: float64 (n, 2), `(x, y)` in metres, map frame; `frame` is `Frame.for_kernels`; `rows`,
+    `cols`: the size of the map. Returns float64 (n, 2), (row, col) in grid units.
+    """
+    line = np.empty((points.shape[0], 2))
+    for i in range(points.shape[0]):
+        row, col = position_of(points[i, 0], points[i, 1], frame)
+        line[i, 0] = min(max(np.rint(row * GRAIN) / GRAIN, 0.0), rows + 0.0)
+        line[i, 1] = min(max(np.rint(col * GRAIN) / GRAIN, 0.0), cols + 0.0)
+    return line
 
 
 _SLIVER_CELLS = 1e-9

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, get_args
 
 from hybridnav._base.clock import clock
-from hybridnav._base.copies import Source, copies_alike
+from hybridnav._base.copies import Source, copies_alike, made
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.errors import InvalidValueError
@@ -18,7 +18,7 @@ from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.costs import CostLayer, cost_along
 from hybridnav.maps.geometry import polyline_length
 from hybridnav.planning import PlannerSettings
-from hybridnav.planning.path import Path, path_of
+from hybridnav.planning.path import Path, cells_of, path_of
 from hybridnav.planning.settings import Smooth
 from hybridnav.refine import LineOfSight
 from hybridnav.refine.one_way import shorten, wrong_at
@@ -112,10 +112,10 @@ def checked_smooth(smooth: Smooth, *, has_arcs: bool) -> Smooth:
     return smooth
 
 
-def _line_of(cells: LongArray, points: FloatArray) -> Path:
+def _line_of(cells: Source[LongArray], points: FloatArray) -> Path:
     """Return the path of lines through points, one point if it goes nowhere."""
     length_m = polyline_length(points)
-    return Path(cells, points if length_m > 0 else points[:1], length_m)
+    return Path(cells, partial(made, points if length_m > 0 else points[:1]), length_m)
 
 
 @copies_alike
@@ -178,8 +178,11 @@ class CutShort:
     def finished(self, query: Query, found: Found) -> Finished:
         """Return the any-angle path; see `Finish`."""
         began = clock()
-        finish = self._costs.arcs if self._has_arcs else self._costs.line
-        path, cost_m = finish(query, found.cells)
+        points, cells = self._costs.shortened(query, found.cells), found.cells
+        if self._has_arcs:
+            path, cost_m = self._costs.arcs(query, cells, points)
+        else:
+            path, cost_m = self._costs.line(cells, points)
         found.stats.seconds["smooth"] = clock() - began
         bound = partial(self._costs.bound, query, cost_m)
         return Finished("any-angle-weighted", path, bound, cost_m, found.lower_bound_m)
@@ -196,12 +199,13 @@ class LineByCosts:
         """Return the path; see `Finish`."""
         points = found.points
         assert points is not None  # noqa: S101 - any-angle methods state them
+        cells = partial(cells_of, found)
         if self._has_arcs:
             began = clock()
-            path, cost_m = self._costs.arcs(query, found.cells, points)
+            path, cost_m = self._costs.arcs(query, cells, points)
             found.stats.seconds["arcs"] = clock() - began
         else:
-            path, cost_m = _line_of(found.cells, points), found.cost_m
+            path, cost_m = _line_of(cells, points), found.cost_m
         bound = partial(self._costs.bound, query, cost_m)
         return Finished(self._metric, path, bound, cost_m, line=points)
 
@@ -220,31 +224,33 @@ class CostFinish:
         self._allow_unexplored = settings.allow_unexplored
         self._turning_radius_m: float = getattr(settings, "turning_radius_m", math.nan)
 
-    def line(
-        self, query: Query, cells: LongArray, points: FloatArray | None = None
-    ) -> tuple[Path, float]:
-        """Return an any-angle path, and its cost in metres; `points`: as for `arcs`."""
-        if points is None:
-            points = shorten(self._line, query.closed, cells, query.points)
+    def shortened(self, query: Query, cells: LongArray) -> FloatArray:
+        """Return the any-angle path that cells are cut short to, `(x, y)` in metres."""
+        return shorten(self._line, query.closed, cells, query.points)
+
+    def line(self, cells: Source[LongArray], points: FloatArray) -> tuple[Path, float]:
+        """Return an any-angle path, and its cost in metres.
+
+        `cells`: those that it passes, or how to find them; `points`: `(x, y)` in metres.
+        """
         path = _line_of(cells, points)
         return path, max(cost_along(self._grid, self.layer, points), path.length_m)
 
     def arcs(
-        self, query: Query, cells: LongArray, points: FloatArray | None = None
+        self, query: Query, cells: Source[LongArray], points: FloatArray
     ) -> tuple[Path, float]:
-        """Return an any-angle path with rounded bends, and its cost in metres; `points`: the path
-        that passes the cells, None for the one that these are cut short to. Where arcs would cross
-        a side the wrong way, the path keeps its bends."""
+        """Return an any-angle path with rounded bends, and its cost in metres; see `line`. Where
+        arcs would cross a side the wrong way, the path keeps its bends."""
         line, closed = self._line_for(query.closed), query.closed
-        if points is None:
-            points = shorten(self._line, closed, cells, query.points)
         found = line.arcs(points, radius_m=self._turning_radius_m)
-        path = Path(cells, found.points, found.length_m, found.headings_rad, is_curved=True)
+        # Measured as it was made.
+        at = partial(made, found.points)
+        path = Path(cells, at, found.length_m, found.headings_rad, is_curved=True)
         if closed is not None and closed.one_way is not None and len(points) > 1:
             curve = line.on_grain(path.poses(_CHORD * self._grid.resolution_m)[:, :2])
-            first, last = map(tuple, cells[[0, -1]].tolist())
+            first, last = map(tuple, path.cells[[0, -1]].tolist())
             if wrong_at(closed.one_way, line.free, curve, (first, last)) is not None:
-                return self.line(query, cells, points)
+                return self.line(path.cells, points)
         return path, max(found.cost_m, found.length_m)
 
     def bound(self, query: Query, cost_m: float) -> float:

@@ -240,7 +240,7 @@ def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     assert cells is not None  # noqa: S101 - the caller has looked
     length_m = found.cost_m if callable(cost) else cost
     if callable(cells):
-        cells = partial(_cells_of, found)
+        cells = partial(cells_of, found)
     if points is None:
         return Path(cells, partial(_centres, cells, frame, length_m), length_m)
     points = points if is_of_cells or length_m > 0 else points[:1]
@@ -250,7 +250,8 @@ def path_of(found: Found, frame: Frame, *, is_of_cells: bool) -> Path:
     return Path(cells, partial(made, points), length_m)
 
 
-def _cells_of(found: Found) -> LongArray:
+def cells_of(found: Found) -> LongArray:
+    """Return the cells of the path that a method found."""
     return found.cells
 
 

@@ -12,6 +12,7 @@ from hybridnav._base.poses import wrapped
 from hybridnav._base.typing import AnyArray, FloatArray, LongArray
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.costs import CostLayer
+from hybridnav.maps.geometry import points_at
 from hybridnav.refine.grid import open_cells
 from hybridnav.refine.kernels import cost_line as kernels
 from hybridnav.refine.kernels.arcs import round_bends
@@ -173,7 +174,7 @@ class CostLine:
 
     def in_metres(self, line: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
         """Return the points of positions, the first and last being exact."""
-        points = self.frame.points_of_grid(line)
+        points = points_at(line, self.frame.for_kernels)
         points[-1], points[0] = goal, start
         return points
 

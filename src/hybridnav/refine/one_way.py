@@ -12,6 +12,7 @@ import numpy as np
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps import Frame
+from hybridnav.maps.geometry import positions_on_grain
 from hybridnav.search.directed import DirectedSides
 from hybridnav.search.found import ClosedCells, Query
 
@@ -137,8 +138,8 @@ def _wrong_on(
 def on_grain(points: FloatArray, frame: Frame, shape: tuple[int, ...]) -> FloatArray:
     """Return the positions of points, (row, col), on the grain of exact tests; those on the rim of
     the map stay there."""
-    line = np.rint(frame.positions_of(points) * GRAIN) / GRAIN
-    return np.clip(line, 0.0, np.array(shape, dtype=np.float64))
+    # A copy: arrays that may not be written would compile the kernel again.
+    return positions_on_grain(np.array(points, np.float64), frame.for_kernels, *shape)
 
 
 # The exact test. A line lies in the closure of one cell, along a side in those of two, at a corner

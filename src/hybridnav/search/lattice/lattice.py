@@ -255,7 +255,7 @@ def _work_for(n_nodes: int) -> kernels.Work:
     """Return the work arrays of queries."""
     before, mark = np.empty(n_nodes, np.int32), np.zeros(n_nodes, np.int64)
     rest, heap = np.full(n_nodes, np.inf), np.empty((_ROOM, 2), np.int64)
-    return kernels.Work(np.empty(n_nodes), before, mark, rest, heap, 0)
+    return kernels.Work(np.empty(n_nodes), before, mark, rest, np.empty(n_nodes), heap, 0)
 
 
 class LatticeLine(NamedTuple):

@@ -63,6 +63,8 @@ class Work(NamedTuple):
     """int64 (nodes,)."""
     rest: np.ndarray
     """float64 (nodes,), infinite."""
+    left: np.ndarray
+    """float64 (nodes,), what is left at least to pay from nodes that were reached."""
     heap: np.ndarray
     """int64 (entries, 2), the open list."""
     generation: int
@@ -111,30 +113,30 @@ def _nodes_near(lattice, at, cell, nodes, costs):
 def _costs_towards(landmarks, starts):
     """Return between what costs from each landmark a node must lie to be near the start.
 
-    These are the lower and the upper end, by the nodes from which it is reached, float64 (2, k).
+    These are the lower and the upper end, by the nodes from which it is reached, float64 (2, k), of
+    the landmarks that have a path to it, int64 (k,).
     """
-    k = landmarks.shape[1]
-    towards = np.empty((2, k))
-    towards[0], towards[1] = np.inf, -np.inf
-    for i in range(len(starts[0])):
-        for j in range(k):
+    reaching = np.empty(landmarks.shape[1], np.int64)
+    towards = np.empty((2, reaching.size))
+    k = 0
+    for j in range(reaching.size):
+        low, high = np.inf, -np.inf
+        for i in range(len(starts[0])):
             at = landmarks[starts[0][i], j]
-            towards[0, j] = min(towards[0, j], at + starts[1][i])
-            towards[1, j] = max(towards[1, j], at - starts[1][i])
-    for j in range(k):
-        towards[0, j] -= _ROUNDING * towards[0, j]
-        towards[1, j] += _ROUNDING * towards[1, j]
-    return towards
+            low, high = min(low, at + starts[1][i]), max(high, at - starts[1][i])
+        if low < np.inf:
+            towards[0, k], towards[1, k] = low - _ROUNDING * low, high + _ROUNDING * high
+            reaching[k], k = j, k + 1
+    return towards[:, :k], reaching[:k]
 
 
-@njit(cache=True, nogil=True)
-def _cost_left(landmarks, towards, node, down, over):
+@njit(cache=True, nogil=True, _nrt=False)
+def _cost_left(landmarks, reaching, towards, node, down, over):
     """Return a lower bound on the cost from a node to the start, which lies so far from it."""
     least = hypot(down, over) * (1 - _ROUNDING)
-    for j in range(landmarks.shape[1]):
-        at = landmarks[node, j]
-        if at < np.inf:
-            least = max(least, at - towards[1, j], towards[0, j] - at)
+    for j in range(reaching.size):
+        at = landmarks[node, reaching[j]]
+        least = max(least, at - towards[1, j], towards[0, j] - at)
     return least
 
 
@@ -154,10 +156,10 @@ def _search(lattice, start, starts, goals, most, work):
     cells, to, landmarks, cols = lattice.cells, lattice.to, lattice.landmarks, lattice.free.shape[1]
     edges_of, edge_costs = lattice.edges_of, lattice.costs
     cost, before, mark = work.cost, work.before, work.mark
-    rest, heap = work.rest, work.heap
+    rest, left, heap = work.rest, work.left, work.heap
     opened, closed = 2 * work.generation, 2 * work.generation + 1
     size, expanded, last, is_full = 0, 0, -1, False
-    towards = _costs_towards(landmarks, starts)
+    towards, reaching = _costs_towards(landmarks, starts)
     # What is left to pay from the nodes round the start.
     for k in range(len(starts[0])):
         rest[starts[0][k]] = starts[1][k]
@@ -166,8 +168,8 @@ def _search(lattice, start, starts, goals, most, work):
         node, first = goals[0][k], goals[1][k]
         cost[node], before[node], mark[node] = first, -1, opened
         row, col = cells[node] // cols + 0.5, cells[node] % cols + 0.5
-        left = _cost_left(landmarks, towards, node, row - start[0], col - start[1])
-        key = np.int64(min((first + left) * _UNITS, _MOST))
+        left[node] = _cost_left(landmarks, reaching, towards, node, row - start[0], col - start[1])
+        key = np.int64(min((first + left[node]) * _UNITS, _MOST))
         push(heap, size, key, node)
         size += 1
     while size > 0:
@@ -192,11 +194,14 @@ def _search(lattice, start, starts, goals, most, work):
         for edge in range(first, first + count):
             other = to[edge]
             whole = here + abs(edge_costs[edge])
-            if mark[other] < opened or whole < cost[other]:
-                row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
-                least = whole + _cost_left(
-                    landmarks, towards, other, row - start[0], col - start[1]
-                )
+            is_new = mark[other] < opened
+            if is_new or whole < cost[other]:
+                if is_new:
+                    row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
+                    left[other] = _cost_left(
+                        landmarks, reaching, towards, other, row - start[0], col - start[1]
+                    )
+                least = whole + left[other]
                 if least < most:
                     cost[other], before[other], mark[other] = whole, node, opened
                     key = np.int64(min(least * _UNITS, _MOST))
