@@ -26,6 +26,8 @@ ROOT = Path(__file__).parents[1]
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
 FAR_APART = (1.0, 13.2), (40.6, 19.4)
 """Ends of a long path through the office."""
+PLAN = ("plan", str(OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")
+"""The command that plans it."""
 RADIUS_M = 0.25
 
 

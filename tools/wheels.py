@@ -22,8 +22,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import ROOT, Refused, option
-from benchmarks.subjects.cold import PLAN
+from benchmarks.common import PLAN, ROOT, Refused, option
 from hybridnav._base.shipped import LEVELS
 
 EXERCISE = (

@@ -10,11 +10,7 @@ from benchmarks.subjects._study_run import GRAPHS
 from hybridnav.harness.tables import shown, text_of
 from hybridnav.harness.yardstick import OPTIMA, YARDSTICKS
 
-TITLES = {
-    "lengths": "Lengths",
-    "costs": "Costs",
-    "ompl": "OMPL",
-}
+TITLES = {"lengths": "Lengths", "costs": "Costs", "ompl": "OMPL"}
 """Parts of the study, and their headings."""
 
 _SHORT = (

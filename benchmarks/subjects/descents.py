@@ -141,10 +141,7 @@ def differs(one: hn.PlanResult, other: hn.PlanResult) -> str:
 
 
 def asked(
-    case: Case,
-    planner: hn.HybridPlanner,
-    rng: np.random.Generator,
-    anew: hn.HybridPlanner | None,
+    case: Case, planner: hn.HybridPlanner, rng: np.random.Generator, anew: hn.HybridPlanner | None
 ) -> tuple[int, str]:
     """Ask for some pairs, and return how many were, and the first fault.
 

@@ -227,10 +227,7 @@ def show_aims(rows: list[tuple[str, float, float, str]]) -> None:
         print_row(name, f"{figure:.3g}", f"{sign} {aim:g}", "yes" if reached else "no")
 
 
-OPTIONS = [
-    DATA,
-    option("--updates", type=int, default=1000),
-]
+OPTIONS = [DATA, option("--updates", type=int, default=1000)]
 
 
 def main(given: Namespace) -> None:

@@ -181,10 +181,7 @@ def sample(data: Path) -> None:
         print_row(preset, *shown, int(wrong.sum()), others)
 
 
-OPTIONS = [
-    DATA,
-    option("--sides", type=int, nargs="*", default=SIDES),
-]
+OPTIONS = [DATA, option("--sides", type=int, nargs="*", default=SIDES)]
 
 
 def main(given: Namespace) -> None:

@@ -70,10 +70,7 @@ def measured(
     }
 
 
-OPTIONS = [
-    option("--map", type=Path, default=OFFICE),
-    option("--pairs", type=int, default=200),
-]
+OPTIONS = [option("--map", type=Path, default=OFFICE), option("--pairs", type=int, default=200)]
 
 
 def main(given: Namespace) -> None:

@@ -22,6 +22,7 @@ from typing import Any
 from benchmarks.common import (
     NEEDED_DATA,
     OFFICE,
+    PLAN,
     ROOT,
     Checkout,
     matches,
@@ -35,7 +36,7 @@ LANES = "aws_small_warehouse/002/map.yaml", "fetch_maps/4_26_15.yaml", "bwi_gdc/
 LEAST_CELLS = 1_000_000
 COMMANDS = {
     "--help": "--help",
-    "plan": f"plan {OFFICE} --start 1.0,13.2 --goal 40.6,19.4",
+    "plan": " ".join(PLAN),
     "evaluate": "evaluate maps/figure1/figure1.yaml --pairs 20 -o {folder}/{run}",
     "rooms": f"rooms {OFFICE}",
     "export": f"export {OFFICE} -o {{folder}}/graph.geojson --force",

@@ -8,6 +8,7 @@ kernel is counted, and files are in the page cache.
 
 import json
 import math
+import os
 import subprocess
 import sys
 import tempfile
@@ -18,14 +19,14 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import OFFICE, ROOT, option, prepared, read
-from benchmarks.subjects.cold import PLAINLY
+from benchmarks.common import OFFICE, PLAN, ROOT, option, prepared, read
 from benchmarks.subjects.scale import tile_of
 from benchmarks.worlds import World
 from hybridnav.harness.tables import Row, to_markdown
 
 FIGURE = ROOT / "maps" / "figure1" / "figure1.yaml"
-QUERY = ("--start", "1.0,13.2", "--goal", "40.6,19.4")
+PLAINLY = {key: text for key, text in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+"""The environment in which Python keeps the bytecode of modules, as it does for users."""
 
 _FIRST = """
 import json, sys, time
@@ -101,9 +102,9 @@ def rows_of(cells: float, runs: int, folder: Path) -> list[Row]:
     packed = bytes_a_cell(office, folder / "packed.hnm", compress=True)
     help_s = seconds(hybridnav("--help"), runs)
     add("`hybridnav --help`", f"{help_s:.2f} s", "0.3 s")
-    plan_s = seconds(hybridnav("plan", OFFICE, *QUERY), runs)
+    plan_s = seconds(hybridnav(*PLAN), runs)
     add("second `hybridnav plan` of the office", f"{plan_s:.2f} s", "1.2 s")
-    plan_s = seconds(hybridnav("plan", model, *QUERY), runs)
+    plan_s = seconds(hybridnav("plan", model, *PLAN[2:]), runs)
     add("the same with a model", f"{plan_s:.2f} s", "0.8 s")
     add("model of the office, memory-mapped", f"{mapped:.1f} bytes a cell", "60")
     add("model of the office, compressed", f"{packed:.1f} bytes a cell", "20")
@@ -123,10 +124,7 @@ def rows_of(cells: float, runs: int, folder: Path) -> list[Row]:
     return rows
 
 
-OPTIONS = [
-    option("--cells", type=float, default=2e6),
-    option("--runs", type=int, default=5),
-]
+OPTIONS = [option("--cells", type=float, default=2e6), option("--runs", type=int, default=5)]
 
 
 def main(given: Namespace) -> None:
