@@ -181,21 +181,6 @@ def test_start_is_goal(smooth: bool) -> None:
     assert answer.nodes == (method.region_of[9, 9],)
 
 
-def test_queries_do_not_depend_on_those_before() -> None:
-    rng = np.random.default_rng(2)
-    classes = np.where(rng.random((40, 40)) < 0.2, 0, 1).astype(np.uint8)
-    grid = occupancy_grid(classes)
-    used = HpaStar(grid, cluster_cells=6)
-    chosen = free_cells(classes, 3, 20)
-    for start, goal in zip(chosen, reversed(chosen), strict=True):
-        again, fresh = used.solve(start, goal), HpaStar(grid, cluster_cells=6).solve(start, goal)
-        assert (again.nodes, again.expanded) == (fresh.nodes, fresh.expanded)
-        assert again.expanded_nodes == fresh.expanded_nodes
-        assert (again.cells is None) == (fresh.cells is None)
-        if again.cells is not None and fresh.cells is not None:
-            assert again.cells.tolist() == fresh.cells.tolist()
-
-
 def test_methods_have_names_and_sizes() -> None:
     grid = occupancy_grid(np.ones((30, 30), dtype=np.uint8))
     smooth, raw = HpaStar(grid), HpaStar(grid, smooth=False)

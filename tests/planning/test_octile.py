@@ -65,22 +65,6 @@ def test_it_answers_what_the_whole_grid_answers(classes: Any, unexplored: bool, 
         assert_same(octile.plan(start, goal), whole.plan(start, goal), enterable)
 
 
-def test_many_queries_get_the_answers_of_each_alone() -> None:
-    grid = figure1_world().grid(robot_radius_m=0.0)
-    octile, _ = both(topology_of(grid, 1.0))
-    cells = np.argwhere(grid.classes >= 0)
-    starts, goals = grid.frame.points_of(
-        cells[np.random.default_rng(0).integers(len(cells), size=600)]
-    ).reshape(2, 300, 2)
-    batch = octile.plan_many(starts, goals)
-    for i in range(300):
-        alone = octile.plan(starts[i], goals[i])
-        assert batch.status[i] == alone.status
-        assert (batch.cost[i], batch.lower_bound[i]) == (alone.cost, alone.lower_bound)
-        points = batch.points[batch.path_start[i] : batch.path_start[i + 1]]
-        assert len(points) == (0 if alone.path is None else len(alone.path.points))
-
-
 def test_its_route_is_read_off_its_path() -> None:
     topology = topology_of(figure1_world().grid(robot_radius_m=0.0), 1.0)
     octile, _ = both(topology)
@@ -106,28 +90,6 @@ def test_what_is_closed_is_passed_by() -> None:
         batch = octile.plan_many([start], [goal], blocked=wall)
         assert batch.status[0] == found.status
         assert batch.cost[0] == pytest.approx(found.cost)
-
-
-def test_threads_may_ask_the_first_query_at_once() -> None:
-    topology = topology_of(office_world().grid(robot_radius_m=0.25))
-    octile, whole = both(topology)
-    pairs = [(pair.start, pair.goal) for pair in sample_pairs(topology.grid, 4, seed=0)]
-    endpoints = topology.grid.frame.points_of(np.array(pairs).reshape(-1, 2)).reshape(-1, 2, 2)
-    found: list[hn.PlanResult | None] = [None] * len(endpoints)
-    ready = threading.Barrier(len(endpoints))
-
-    def ask(i: int) -> None:
-        ready.wait()
-        found[i] = octile.plan(*endpoints[i])
-
-    threads = [threading.Thread(target=ask, args=(i,)) for i in range(len(endpoints))]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for result, (start, goal) in zip(found, endpoints, strict=True):
-        assert result is not None
-        assert_same(result, whole.plan(start, goal), topology.grid.enterable())
 
 
 def assert_equal_on(path: Path, count: int) -> None:

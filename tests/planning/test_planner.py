@@ -440,17 +440,6 @@ def test_results_are_values_that_nobody_can_change() -> None:
     assert planner.plan((0.5, 0.5), (8.5, 0.5)).settings["pyramid"]["seed"] == 0
 
 
-def test_equal_questions_have_equal_answers_whatever_was_asked_before() -> None:
-    rng = np.random.default_rng(0)
-    classes = (rng.random((12, 12)) > 0.25).astype(np.uint8)
-    cells = np.argwhere(classes == CellClass.FREE)
-    pairs = rng.choice(cells, size=(12, 2))[..., ::-1] + 0.5
-    planners = [hn.HybridPlanner(map_of(classes, merge_distance_m=3.0)) for _ in range(2)]
-    first = [without_seconds(planners[0].plan(*pair)) for pair in pairs]
-    again = [without_seconds(planners[1].plan(*pair)) for pair in pairs[::-1]][::-1]
-    assert first == again == [without_seconds(planners[0].plan(*pair)) for pair in pairs]
-
-
 def test_importing_the_package_loads_neither_numba_nor_matplotlib() -> None:
     program = (
         "import sys, hybridnav, hybridnav.maps.files, hybridnav.planning, hybridnav.maps\n"

@@ -5,23 +5,29 @@ import importlib
 import inspect
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 SOURCE = Path(__file__).parents[2] / "src" / "hybridnav"
-TREES = {
-    path.relative_to(SOURCE).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
-    for path in sorted(SOURCE.rglob("*.py"))
-}
 PACKAGES = sorted(path.parent.name for path in SOURCE.glob("*/__init__.py"))
 _MOST_PARAMETERS = 6
 """A kernel with more of them describes them all in a section."""
 
 
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Read the sources, when a test asks for them: every process collects this file."""
+    return {
+        path.relative_to(SOURCE).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+        for path in sorted(SOURCE.rglob("*.py"))
+    }
+
+
 def _nodes(kind: type[Any]) -> Iterator[tuple[str, Any]]:
-    for path, tree in TREES.items():
+    for path, tree in trees().items():
         for node in ast.walk(tree):
             if isinstance(node, kind):
                 yield f"{path}::{node.name}", node
@@ -123,7 +129,7 @@ def test_functions_are_described_by_an_imperative() -> None:
 def test_no_sentence_begins_with_of() -> None:
     texts = [
         (path, node.value)
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         for node in ast.walk(tree)
         if isinstance(node, ast.Constant) and isinstance(node.value, str)
     ]

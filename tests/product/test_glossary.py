@@ -4,6 +4,7 @@ import ast
 import importlib
 import re
 from collections import Counter
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import hybridnav as hn
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src" / "hybridnav"
-TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCE.rglob("*.py")}
 USED, NOT_USED = (
     [[cell.strip() for cell in row.strip("|").split("|")] for row in table.splitlines()[2:]]
     for table in re.findall(
@@ -20,6 +20,12 @@ USED, NOT_USED = (
         re.MULTILINE | re.DOTALL,
     )
 )
+
+
+@cache
+def trees() -> dict[Path, ast.Module]:
+    """Read the sources, when a test asks for them: every process collects this file."""
+    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCE.rglob("*.py")}
 
 
 def _named(name: str) -> Any:
@@ -53,7 +59,7 @@ def test_nothing_is_called_by_a_word_that_the_glossary_rules_out() -> None:
     old = {name for word, _ in NOT_USED for name in (word, f"{word}s")} - kept - {"side", "sides"}
     found = [
         f"{path.relative_to(SOURCE)}: {name}"
-        for path, tree in TREES.items()
+        for path, tree in trees().items()
         for node in ast.walk(tree)
         for name in _names_of(node)
         if name.strip("_").lower() in old
@@ -73,7 +79,7 @@ def _names_of(node: ast.AST) -> list[str]:
 def test_no_two_modules_define_a_class_of_the_same_name() -> None:
     counted = Counter(
         node.name
-        for tree in TREES.values()
+        for tree in trees().values()
         for node in tree.body
         if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
     )

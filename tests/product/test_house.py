@@ -31,7 +31,7 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 71_621,
+    "lines of tests": 71_520,
 }
 
 BUDGETS = {

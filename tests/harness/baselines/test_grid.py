@@ -124,22 +124,6 @@ def test_start_is_goal(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_queries_do_not_depend_on_those_before(name: str) -> None:
-    rng = np.random.default_rng(2)
-    classes = np.where(rng.random((40, 40)) < 0.25, 0, 1).astype(np.uint8)
-    grid = occupancy_grid(classes)
-    used = make(name, grid)
-    chosen = free_cells(classes, 3, 20)
-    for start, goal in zip(chosen, reversed(chosen), strict=True):
-        again, fresh = used.solve(start, goal), make(name, grid).solve(start, goal)
-        assert again.expanded == fresh.expanded
-        assert again.bound == fresh.bound
-        assert (again.cells is None) == (fresh.cells is None)
-        if again.cells is not None and fresh.cells is not None:
-            assert (again.cells == fresh.cells).all()
-
-
-@pytest.mark.parametrize("name", METHODS)
 def test_corners_are_cut_where_the_grid_allows_it(name: str) -> None:
     grid = occupancy_grid(drawn("#.", ".#"))
     assert make(name, grid).solve((0, 0), (1, 1)).cells is None

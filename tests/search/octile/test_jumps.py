@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -218,20 +217,6 @@ def test_paths_with_directions_are_shortest_and_a_missing_one_is_known() -> None
                 n_known += path is None and found.expanded == 0
     assert n_lone > 0
     assert n_known > 0
-
-
-def test_threads_that_share_a_search_get_the_answers_of_one() -> None:
-    free = speckled(4)
-    starts, goals = pairs_of(free, 400)
-    for search in searches(free):
-        expected = search.many(starts, goals)
-        with ThreadPoolExecutor(4) as pool:
-            alone = list(
-                pool.map(search.path, map(tuple, starts.tolist()), map(tuple, goals.tolist()))
-            )
-        assert [path.length_cells for path in alone] == expected.length_cells.tolist()
-        for i, path in enumerate(alone):
-            assert path_of(expected, i) == ([] if path.cells is None else path.cells.tolist())
 
 
 @pytest.mark.full
