@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_528,
-    "lines": 103_163,
+    "code": 65_531,
+    "lines": 103_174,
     "files": 438,
-    "code outside ext": 50_471,
+    "code outside ext": 50_474,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -48,7 +48,7 @@ BUDGETS = {
     "maps": (5321, 6),
     "models": (2113, 6),
     "planning": (6863, 9),
-    "pyramid": (4296, 9),
+    "pyramid": (4307, 9),
     "reasons": (1176, 6),
     "refine": (6138, 9),
     "rooms": (5539, 8),

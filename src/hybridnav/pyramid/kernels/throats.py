@@ -108,35 +108,34 @@ def divide(classes, clearance, most, small, slight, depth):
     that each fine part lies in.
     """
     shape = clearance.shape
-    away = clearance.ravel()
-    order, begin = in_order(away, most)
-    crossings = crossings_of(classes)
-    fine_of = np.full(away.size, np.int32(-1), np.int32)
-    behind = np.empty(away.size, np.int32)
+    order, begin = in_order(clearance.ravel(), most)
+    fine_of = unreached_squares(crossings_of(classes), clearance.ravel())
     # A part is a tree of what was begun; its root is the oldest, which has the widest square.
     parents = np.empty(order.size, np.int32), np.empty(order.size, np.int32)
     sizes = np.empty(order.size, np.int32), np.empty(order.size, np.int32)
     widest = np.empty(order.size, np.int32)
     limits = small, slight, depth
-    # One queue for each clearance, linked through `behind`.
-    head = np.full(most + 1, np.int32(-1), np.int32)
-    tail = np.full(most + 1, np.int32(-1), np.int32)
-    steps = np.array([1, shape[1], -1, -shape[1]])
+    # One queue for each clearance, side by side, of squares and their crossings: what is read next
+    # is known ahead, so that on large maps the processor waits for many squares at once.
+    queue = np.empty(order.size, np.uint32)
+    head, tail = begin.copy(), begin.copy()
+    steps = (1, shape[1], -1, -shape[1])
     # Every square with a clearance is in `order` once, and in at most one queue once.
     n_begun = 0
     for level in range(most, 0, -1):
         unreached = begin[level]
         while True:
-            square = head[level]
-            if square >= 0:
-                head[level] = behind[square]
+            if head[level] < tail[level]:
+                square, crossings = np.int64(queue[head[level]] >> 4), queue[head[level]] & 15
+                head[level] += 1
             else:
                 # No part has reached what is left of this clearance.
                 while unreached < begin[level + 1] and fine_of[order[unreached]] >= 0:
                     unreached += 1
                 if unreached == begin[level + 1]:
                     break
-                square = order[unreached]
+                square = np.int64(order[unreached])
+                crossings = np.uint32(_NONE - fine_of[square]) & 15
                 fine_of[square] = parents[0][n_begun] = parents[1][n_begun] = n_begun
                 sizes[0][n_begun] = sizes[1][n_begun] = 0
                 widest[n_begun] = level
@@ -146,29 +145,41 @@ def divide(classes, clearance, most, small, slight, depth):
             sizes[0][fine] += 1
             sizes[1][find(parents[1], fine)] += 1
             for side in range(4):
-                if crossings[square] >> side & 1 == 0:
+                if crossings >> side & 1 == 0:
                     continue
                 beside = square + steps[side]
+                state = fine_of[beside]
                 # Two parts meet here: all that either has so far is as wide or wider.
-                if fine_of[beside] >= 0:
-                    if fine_of[beside] != fine:
-                        other = find(parents[0], fine_of[beside])
+                if state >= 0:
+                    if state != fine:
+                        other = find(parents[0], state)
                         if other != fine:
                             fine = meet(fine, other, level, most, parents, sizes, widest, limits)
                     continue
-                # An unreached square waits for its turn, at the end of its queue.
+                # An unreached square, no wider than this one, waits for its turn.
                 fine_of[beside] = fine
-                k = min(away[beside], level)
-                if head[k] < 0:
-                    head[k] = beside
-                else:
-                    behind[tail[k]] = beside
-                tail[k] = beside
-                behind[beside] = -1
+                k = (_NONE - state) >> 4
+                queue[tail[k]] = np.uint32(beside) << 4 | np.uint32(_NONE - state) & 15
+                tail[k] += 1
     number, part_of = numbered(parents, n_begun)
-    for square in order:
-        fine_of[square] = number[find(parents[0], fine_of[square])]
+    for square in range(fine_of.size):
+        if fine_of[square] >= 0:
+            fine_of[square] = number[find(parents[0], fine_of[square])]
     return fine_of.reshape(shape), part_of
+
+
+_NONE = -1
+"""The fine part of a square without one. Squares that wait for theirs have lesser numbers."""
+
+
+@njit(cache=True, nogil=True)
+def unreached_squares(crossings, away):
+    """Return how squares are marked before a part reaches them, int32: `_NONE` less 16 times the
+    clearance and the crossings. One number is one line of memory, and not three."""
+    marks = np.empty(away.size, np.int32)
+    for square in range(away.size):
+        marks[square] = _NONE - (np.int32(away[square]) << 4 | crossings[square])
+    return marks
 
 
 @njit(cache=True, nogil=True)
