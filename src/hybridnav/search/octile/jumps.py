@@ -165,16 +165,16 @@ def build_jump_graph(free: BoolArray, one_way: DirectedSides | None = None) -> J
     inside = np.ascontiguousarray(free[low[0] : high[0], low[1] : high[1]])
     framed = np.pad(inside.view(np.uint8), 1)
     height, width = framed.shape
-    stops, corners, kinds, index = number_cells(framed)
+    halts, corners, kinds, index = number_cells(framed)
     distances = np.int16 if max(inside.shape) <= _SHORT else np.int32
     ahead = np.empty((int(np.count_nonzero(inside)), 8), dtype=distances)
     origin, barred, behind = (low[0] - 1, low[1] - 1), np.empty((0, width), np.uint8), ahead
     if one_way is not None:
         barred, against, *near = near_sides(framed, one_way, origin)
-        corners, kinds = with_corners((index, stops), corners, kinds, near)
+        corners, kinds = with_corners((index, halts), corners, kinds, near)
         behind = np.empty_like(ahead)
-        look_ahead(framed, stops, behind, against)
-    look_ahead(framed, stops, ahead, barred)
+        look_ahead(framed, halts, behind, against)
+    look_ahead(framed, halts, ahead, barred)
     row, col = np.divmod(corners.astype(np.int64), width)
     places = (row << COLUMN_BITS | col) << KIND_BITS | kinds
     order, none = np.arange(len(corners), dtype=np.int32), np.empty(0, np.int64)

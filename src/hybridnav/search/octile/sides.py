@@ -56,12 +56,12 @@ def with_corners(
     `near`: the flat cells beside sides with a direction, whose kind is 0, and the corner cells
     among them.
     """
-    (index, stops), (zone, turns) = tables, near
+    (index, halts), (zone, turns) = tables, near
     every = np.union1d(corners, turns).astype(np.int32)
     found = np.zeros(len(every), np.uint8)
     found[np.searchsorted(every, corners)] = kinds
     found[np.isin(every, zone)] = 0
-    stops.ravel()[turns] = 1
+    halts.ravel()[turns] = 1
     np.bitwise_or.at(index[:, 1], turns >> 6, np.int64(1) << (turns & 63))
     before = np.searchsorted(every, np.arange(len(index)) << 6)
     index[:, 2] = index[:, 2] >> 32 << 32 | before

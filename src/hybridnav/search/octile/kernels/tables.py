@@ -99,10 +99,10 @@ def _kinds(here, beside, kinds, west, east):
 
 
 @njit(cache=True, nogil=True)
-def look_ahead(free, stops, ahead, barred):
+def look_ahead(free, halts, ahead, barred):
     """Fill in the distances ahead of each free cell in the eight directions.
 
-    `free`: see `number_cells`; `stops`: uint8 (rows, cols), not 0 for corner cells; `ahead`: int16
+    `free`: see `number_cells`; `halts`: uint8 (rows, cols), not 0 for corner cells; `ahead`: int16
     or int32 (n_free, 8), filled in; `barred`: uint8 (rows, cols), bit k for a move in direction k
     that is illegal though its cells are free; without rows for none. Along a side: the distance to
     the next corner cell, or 0 or less, minus the free cells before a blocked one. Along a diagonal:
@@ -111,15 +111,15 @@ def look_ahead(free, stops, ahead, barred):
     """
     rows, width = free.shape
     nothing = np.zeros(width, np.uint8)
-    # Rows come first, because what a cell sees along a side decides where a diagonal stops.
+    # Rows come first, because what a cell sees along a side decides where a diagonal halts.
     east, west = np.zeros(width, ahead.dtype), np.zeros(width, ahead.dtype)
     sees, events = np.zeros((2, rows, width), np.uint8), np.empty(width, np.int32)
     first = np.zeros(rows + 1, np.int64)
     for row in range(1, rows - 1):
         here, n_before = free[row], first[row]
         bar = barred[row] if len(barred) else nothing
-        _look_east(here[1:], stops[row, 1:], bar, east[:-1], events)
-        _look_west(here[:-1], stops[row, :-1], bar[1:], west[1:], events)
+        _look_east(here[1:], halts[row, 1:], bar, east[:-1], events)
+        _look_west(here[:-1], halts[row, :-1], bar[1:], west[1:], events)
         for col in range(width):
             sees[0, row, col], sees[1, row, col] = east[col] > 0, west[col] > 0
         for col in range(width):
@@ -133,7 +133,7 @@ def look_ahead(free, stops, ahead, barred):
         before, distances = np.zeros((3, width), ahead.dtype), np.zeros((3, width), ahead.dtype)
         for k in range(1, rows - 1):
             row = k if step == -1 else rows - 1 - k
-            here, there, stop = free[row], free[row + step], stops[row + step]
+            here, there, stop = free[row], free[row + step], halts[row + step]
             bar = (barred[row] if len(barred) else nothing)[1:-1]
             own, near = (here[1:-1], bar, straight), (there[1:-1], stop[1:-1], before[0, 1:-1])
             _look_straight(own, near, distances[0, 1:-1])
@@ -154,7 +154,7 @@ def look_ahead(free, stops, ahead, barred):
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _look_west(free, stops, bar, distances, events):
+def _look_west(free, halts, bar, distances, events):
     """Fill in the distances to the west of the cells of a row by what lies west of each.
 
     An event is a cell where the look ends: twice its place, and 1 more if it is a corner cell that
@@ -162,7 +162,7 @@ def _look_west(free, stops, bar, distances, events):
     """
     for i in range(len(distances)):
         is_open = free[i] & ~(bar[i] >> 4) & 1
-        events[i] = np.int32(2 * i + is_open) * np.int32(is_open ^ 1 | (stops[i] != 0))
+        events[i] = np.int32(2 * i + is_open) * np.int32(is_open ^ 1 | (halts[i] != 0))
     last = np.int32(0)
     for i in range(len(distances)):
         last = max(last, events[i])
@@ -173,13 +173,13 @@ def _look_west(free, stops, bar, distances, events):
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _look_east(free, stops, bar, distances, events):
+def _look_east(free, halts, bar, distances, events):
     """Fill in the distances to the east of the cells of a row by what lies east of each; see
     `_look_west`."""
     n = len(distances)
     for i in range(n):
         is_open = free[i] & ~bar[i] & 1
-        is_event = is_open ^ 1 | (stops[i] != 0)
+        is_event = is_open ^ 1 | (halts[i] != 0)
         events[i] = np.int32(2 * i + is_open) if is_event else np.int32(2 * n)
     last = np.int32(2 * n)
     for i in range(n):
@@ -198,10 +198,10 @@ def _look_straight(own, near, distances):
     `own`: which cells are free, what is barred there, and the direction; `near`: which cells of the
     row before are free, which of them stop a look, and their distances.
     """
-    (is_free, bar, k), (is_free_there, stops, before) = own, near
+    (is_free, bar, k), (is_free_there, halts, before) = own, near
     for i in range(len(distances)):
         seen = before[i] + 1 if before[i] > 0 else before[i] - 1
-        seen = 1 if stops[i] else seen
+        seen = 1 if halts[i] else seen
         distances[i] = seen if is_free[i] & is_free_there[i] & ~(bar[i] >> k) & 1 else 0
 
 
@@ -213,11 +213,11 @@ def _look_aslant(square, bar, k, look, distances):
     `look`: of the cells where these moves end, which stop a look, which see a corner cell along
     their row, and their distances straight on and aslant.
     """
-    (one, two, three, four), (stops, sees, straight, before) = square, look
+    (one, two, three, four), (halts, sees, straight, before) = square, look
     for i in range(len(distances)):
         seen = before[i] + 1 if before[i] > 0 else before[i] - 1
         # A path may turn off the diagonal where a side leads to a corner cell.
-        seen = 1 if ((stops[i] | sees[i]) != 0) | (straight[i] > 0) else seen
+        seen = 1 if ((halts[i] | sees[i]) != 0) | (straight[i] > 0) else seen
         distances[i] = seen if one[i] & two[i] & three[i] & four[i] & ~(bar[i] >> k) & 1 else 0
 
 
