@@ -26,8 +26,8 @@ def test_a_kernel_reads_and_writes_arrays_by_their_places(kernel, shape) -> None
     flags, values = np.arange(shape[0]) % 3 == 0, np.arange(shape[0] + 2.0)
     rows, before = np.full(shape, -1, np.int64), values.copy()
     given = places_of(flags, (table, (values, 7)), rows)
-    assert given.shape == (5, 3)
-    assert given[3].tolist() == [7, 0, 0]
+    assert given.shape == (5, 4)
+    assert given[3].tolist() == [7, 0, 0, 0]
     assert kernel(given) == (shape[0], shape, shape[0] + 2, shape)
     assert np.array_equal(rows, table * 7)
     assert np.array_equal(values[: shape[0]] - before[: shape[0]], np.where(flags, 0.5, -1.0))
@@ -44,3 +44,26 @@ def test_a_kernel_takes_a_fixed_array_as_read_only() -> None:
     if hasattr(write, "py_func"):
         with pytest.raises(Exception, match="readonly"):
             write(places_of(np.zeros(2, np.int32)))
+
+
+@pytest.mark.parametrize("is_compiled", [True, False])
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.zeros(3, np.int64),
+        np.zeros(3, np.float32),
+        np.zeros(3, np.uint32),
+        np.zeros((3, 1), np.int32),
+        np.zeros(6, np.int32)[::2],
+        7,
+    ],
+)
+def test_an_array_of_another_kind_is_refused(given, is_compiled) -> None:
+    @njit()
+    def read(places):
+        return fixed(places, 0, np.int32)[0]
+
+    kernel = read if is_compiled else getattr(read, "py_func", read)
+    assert kernel(places_of(np.array([5], np.int32))) == 5
+    with pytest.raises(TypeError, match="array of int32 with 1 axes and without gaps"):
+        kernel(places_of(given))

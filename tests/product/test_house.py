@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_531,
-    "lines": 103_174,
+    "code": 65_545,
+    "lines": 103_199,
     "files": 438,
-    "code outside ext": 50_474,
+    "code outside ext": 50_488,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -31,11 +31,11 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 225,
     "functions with a value called known": 142,
-    "lines of tests": 71_520,
+    "lines of tests": 71_543,
 }
 
 BUDGETS = {
-    "_base": (2900, 6),
+    "_base": (2925, 6),
     "cli": (3818, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),

@@ -27,6 +27,7 @@ from numba.core.caching import (
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime.nrt import rtsys
 from numba.extending import intrinsic, overload, register_jitable
+from numba.np.numpy_support import as_dtype
 
 from hybridnav._base import shipped
 from hybridnav._base.clock import listen
@@ -197,21 +198,29 @@ def _load_arrays() -> None:
 
 
 @cache
-def array_at(n_axes: int, is_fixed: bool) -> Any:  # noqa: FBT001 - keys of a cache
+def array_at(n_axes: int, is_fixed: bool, kind_of: Any, refusal: Any) -> Any:  # noqa: FBT001 - keys of a cache
     """Return what kernels call for an array of `kernels.places`; numba's `carray` makes an array of
-    a pointer in the same way, but none that is read only."""
+    a pointer in the same way, but none that is read only.
+
+    `kind_of`, `refusal`: those of `kernels.places`.
+    """
     arrays: Any = import_module("numba.np.arrayobj")  # without types
 
     def made(_typing: Any, places: Any, k: Any, dtype: Any) -> Any:
         made_of = types.Array(dtype.dtype, n_axes, "C", readonly=is_fixed)
+        of_elements = as_dtype(dtype.dtype)
 
         def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             table = arrays.make_array(signature.args[0])(context, builder, given[0])
-            at = builder.mul(context.cast(builder, given[1], k, types.intp), cgutils.intp_t(3))
-            place, *shape = (
+            at = builder.mul(context.cast(builder, given[1], k, types.intp), cgutils.intp_t(4))
+            place, *shape, kind = (
                 builder.load(builder.gep(table.data, [builder.add(at, cgutils.intp_t(i))]))
-                for i in range(1 + n_axes)
+                for i in (*range(1 + n_axes), 3)
             )
+            wanted = cgutils.intp_t(kind_of(of_elements, n_axes))
+            with builder.if_then(builder.icmp_signed("!=", kind, wanted), likely=False):
+                told = (refusal(of_elements, n_axes),)
+                context.call_conv.return_user_exc(builder, TypeError, told)
             element = context.get_data_type(made_of.dtype)
             size = cgutils.intp_t(context.get_abi_sizeof(element))
             array = arrays.make_array(made_of)(context, builder)
