@@ -39,10 +39,10 @@ class ArcLine(NamedTuple):
 class CostLine:
     """Finisher of paths by costs, on one grid: it moves a path to where it costs least.
 
-    The path becomes a chain of points some three cells apart that is pulled taut by its own cost.
-    All points move to their sides at a time, by Newton's method on the integral of the factors,
-    until none would move any more. Then its bends move one at a time. So the line passes obstacles
-    on the sides that the path takes, and lines that begin near each other end in the same place.
+    The path is cut short, and where it passes costs it becomes a chain of points some cells apart.
+    All points move aside at a time, by dynamic programming on the exact cost, far at first and less
+    and less then. Then its bends at walls move one at a time. So the line passes obstacles on the
+    sides that the path takes, and lines that begin near each other end in the same place.
     New segments are tested exactly: a line never leaves the union of the closed squares of the
     enterable cells.
 
@@ -57,7 +57,8 @@ class CostLine:
 
     Notes
     -----
-    S. Quinlan, O. Khatib: Elastic bands, 1993, is the idea; here the whole chain moves at a time.
+    S. Quinlan, O. Khatib: Elastic bands, 1993, is the idea; here the whole chain moves at a
+    time, by R. Bellman: Dynamic programming, 1957.
 
     Examples
     --------
@@ -130,7 +131,7 @@ class CostLine:
         FloatArray
             float64 (m, 2), positions with the same ends; never dearer.
         """
-        return kernels.settle(self.free, self.factors, path)[0]
+        return kernels.settle(self.free, self.factors, path)
 
     def rest_of(self, line: FloatArray, start: FloatArray, most_m: float) -> FloatArray | None:
         """Return the rest of a line from a point beside it.

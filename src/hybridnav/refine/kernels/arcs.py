@@ -72,16 +72,19 @@ def arc_cost(free, factors, a, bend, c):
     reach = radius * tan(step / 2)
     total, chords = 0.0, 0.0
     row, col = a[0], a[1]
+    # Sines and cosines of the angle along the arc, and of a step.
+    sine, cosine, step_sine, step_cosine = 0.0, 1.0, sin(step), cos(step)
     for k in range(1, n + 1):
-        angle = step * k
         at_row, at_col = c[0], c[1]
+        tip_row = row + reach * (cosine * u_row + sine * v_row)
+        tip_col = col + reach * (cosine * u_col + sine * v_col)
+        sine, cosine = (
+            sine * step_cosine + cosine * step_sine, cosine * step_cosine - sine * step_sine
+        )  # fmt: skip
         if k < n:
-            along, beside = radius * sin(angle), radius * (1 - cos(angle))
+            along, beside = radius * sine, radius * (1 - cosine)
             at_row = _on_grain(a[0] + along * u_row + beside * v_row)
             at_col = _on_grain(a[1] + along * u_col + beside * v_col)
-        before = angle - step
-        tip_row = row + reach * (cos(before) * u_row + sin(before) * v_row)
-        tip_col = col + reach * (cos(before) * u_col + sin(before) * v_col)
         low_row, high_row = min(row, at_row, tip_row), max(row, at_row, tip_row)
         low_col, high_col = min(col, at_col, tip_col), max(col, at_col, tip_col)
         if not _box_is_free(free, low_row, low_col, high_row, high_col):
@@ -230,23 +233,24 @@ def round_bends(free, factors, line, radius, spare):
             most = max(most - kept, min(most, radius * half))
         room = hypot(bend[0] - last[0], bend[1] - last[1])
         most = min(room, most, _LARGEST * radius * half)
-        a, c, arc = bend, bend, 0.0
-        # The widest arc first, then halves of it down to the radius; else a turn on the spot.
+        # The cheapest of arcs from the widest on, each half as wide as the one before, down to the
+        # radius, until one is dearer than the last; else a turn on the spot.
+        a, c, arc, least = bend, bend, 0.0, np.inf
         while most >= radius * half * (1 - _SMALLEST_TURN):
-            a, c = _towards(bend, last, most), _towards(bend, ahead, most)
-            arc = -1.0
-            # Rounding moves a and c off the segments, so what is left of these is tested again.
-            if _is_legal(free, last, a) and _is_legal(free, c, ahead):
-                arc = arc_cost(free, factors, a, bend, c)
-            added = arc - segment_cost(factors, a[0], a[1], bend[0], bend[1])
-            added -= segment_cost(factors, bend[0], bend[1], c[0], c[1])
-            if arc >= 0 and added <= spare:
-                spare -= added
-                break
-            a, c, arc = bend, bend, 0.0
+            # Rounding moves the ends off the segments, so what is left of these is tested again.
+            begin, end = _towards(bend, last, most), _towards(bend, ahead, most)
+            if _is_legal(free, last, begin) and _is_legal(free, end, ahead):
+                now = arc_cost(free, factors, begin, bend, end)
+                added = now - segment_cost(factors, begin[0], begin[1], bend[0], bend[1])
+                added -= segment_cost(factors, bend[0], bend[1], end[0], end[1])
+                if now >= 0 and added <= spare:
+                    if added >= least:
+                        break
+                    a, c, arc, least = begin, end, now, added
             if most <= radius * half + 2 * _MARGIN:  # less would leave a line of no length
                 break
             most = max(most / 2, radius * half)
+        spare -= least if least < np.inf else 0.0
         cost += segment_cost(factors, last[0], last[1], a[0], a[1]) + arc
         length += hypot(a[0] - last[0], a[1] - last[1])
         length += hypot(c[0] - a[0], c[1] - a[1]) * (turn / 2) / sin(turn / 2)

@@ -1,4 +1,5 @@
-"""Kernels that move the points of a chain: all to their sides, by Newton's method, or one by one.
+"""Kernels that move the points of a chain: all aside at a time, by dynamic programming, or one by
+one.
 
 Positions are those of `taut`.
 """
@@ -6,16 +7,19 @@ Positions are those of `taut`.
 import numpy as np
 
 from hybridnav._base.jit import njit
-from hybridnav._base.kernels.arrays import total
 from hybridnav._base.trig import hypot
 from hybridnav.maps.costs.integral import legal_cost, segment_cost
 
 FINE = 2.0**12
 """Points of a chain are rounded to this part of a cell."""
-_BESIDE = 0.4
-"""Cells to both sides at which the slope of the factors is measured."""
-_DAMPING = 1e-3
-_SWEEPS = 16
+_SLANT = np.sqrt(0.5)
+"""Cosine and sine of the angle, an eighth of a turn, by which points move off the direction across
+their chain, by turns to one side and the other: so two passes try all directions."""
+_IDLE = 2
+"""Passes in which a point has to stay until it is left in peace."""
+_SAVED = 1e-7
+"""Cells that a move must save."""
+_SWEEPS = 48
 """Most times that each point of a line that has settled is tried elsewhere."""
 _FIRST_REACH, _LAST_REACH = 1.0, 0.1
 """How far away, in cells, at first and at last."""
@@ -28,112 +32,6 @@ _GAIN = 1e-5
 
 
 @njit(cache=True, nogil=True)
-def _factor_at(factors, row, col):
-    """Return the factor at a position, interpolated between the centres of four cells; beyond the
-    outer ones it stays."""
-    row, col = max(row - 0.5, 0.0), max(col - 0.5, 0.0)
-    low, left = int(row), int(col)
-    up, over = np.float32(row - low), np.float32(col - left)
-    if low + 1 < factors.shape[0] and left + 1 < factors.shape[1]:
-        first = factors[low, left] + over * (factors[low, left + 1] - factors[low, left])
-        low += 1
-        second = factors[low, left] + over * (factors[low, left + 1] - factors[low, left])
-        return first + up * (second - first)
-    low, left = min(low, factors.shape[0] - 1), min(left, factors.shape[1] - 1)
-    high, right = min(low + 1, factors.shape[0] - 1), min(left + 1, factors.shape[1] - 1)
-    first = factors[low, left] + over * (factors[low, right] - factors[low, left])
-    second = factors[high, left] + over * (factors[high, right] - factors[high, left])
-    return first + up * (second - first)
-
-
-@njit(cache=True, nogil=True)
-def slopes_of(factors, chain, stride, aside, slope, bend, link):
-    """Measure how the cost of a chain changes as its points move aside: the slope, and the
-    curvature, which is a matrix with three diagonals. Return the cost.
-
-    Parameters
-    ----------
-    factors
-        See `settle`.
-    chain
-        float64 (n, 2), positions.
-    stride
-        Cells from one place at which it is measured to the next.
-    aside
-        float64 (n, 2), unit vectors, the directions in which points move.
-    slope, bend, link
-        float64 (n,), changed: the slope by each point, the diagonal of the curvature, and what
-        stands beside it, for each point and the next.
-    """
-    slope[:], bend[:], link[:] = 0.0, 0.0, 0.0
-    cost = 0.0
-    for i in range(chain.shape[0] - 1):
-        down, over = chain[i + 1, 0] - chain[i, 0], chain[i + 1, 1] - chain[i, 1]
-        length = hypot(down, over)
-        if length < 1e-9:
-            continue
-        ahead_row, ahead_col = down / length, over / length
-        side_row, side_col = -ahead_col, ahead_row
-        # Along the segment: the factor, its slope to the side and its curvature. What curves
-        # downwards is left out, so that a step leads to a minimum.
-        n = max(int(length / stride + 0.999), 1)
-        mean, first, second = 0.0, 0.0, 0.0
-        first_bend, second_bend, both = 0.0, 0.0, 0.0
-        for k in range(n):
-            share = (k + 0.5) / n
-            row, col = chain[i, 0] + share * down, chain[i, 1] + share * over
-            here = _factor_at(factors, row, col)
-            right = _factor_at(factors, row + _BESIDE * side_row, col + _BESIDE * side_col)
-            left = _factor_at(factors, row - _BESIDE * side_row, col - _BESIDE * side_col)
-            rise = (right - left) / (2 * _BESIDE)
-            curve = max((right - 2 * here + left) / (_BESIDE * _BESIDE), 0.0)
-            mean += here
-            first += (1 - share) * rise
-            second += share * rise
-            first_bend += (1 - share) * (1 - share) * curve
-            second_bend += share * share * curve
-            both += share * (1 - share) * curve
-        mean, weight = mean / n, length / n
-        cost += mean * length
-        # The segment pulls at both of its points with the factor along it, like a string.
-        a_side = aside[i, 0] * side_row + aside[i, 1] * side_col
-        b_side = aside[i + 1, 0] * side_row + aside[i + 1, 1] * side_col
-        a_ahead = aside[i, 0] * ahead_row + aside[i, 1] * ahead_col
-        b_ahead = aside[i + 1, 0] * ahead_row + aside[i + 1, 1] * ahead_col
-        tension = mean / length
-        slope[i] += weight * first * a_side - mean * a_ahead
-        slope[i + 1] += weight * second * b_side + mean * b_ahead
-        bend[i] += (tension + weight * first_bend) * a_side * a_side
-        bend[i + 1] += (tension + weight * second_bend) * b_side * b_side
-        link[i] = (weight * both - tension) * a_side * b_side
-    return cost
-
-
-@njit(cache=True, nogil=True)
-def solve(slope, bend, link, held, farthest, step):
-    """Solve for the step of the inner points that makes the slope 0, by elimination.
-
-    `slope`, `bend`, `link`: see `slopes_of`; `held`: float64 (n,), the steps of points that are
-    held, NaN for others; `farthest`: float64 (n,), the farthest that points may go; `step`: float64
-    (n,), changed; the first and the last stay 0.
-    """
-    n = slope.shape[0]
-    above = np.zeros(n)
-    for i in range(1, n - 1):
-        if not np.isnan(held[i]):
-            above[i], step[i] = 0.0, held[i]
-            continue
-        below = link[i - 1] if i > 1 else 0.0
-        pivot = bend[i] + _DAMPING - below * above[i - 1]
-        above[i] = link[i] / pivot if i < n - 2 else 0.0
-        step[i] = (-slope[i] - below * step[i - 1] * (i > 1)) / pivot
-    for i in range(n - 3, 0, -1):
-        step[i] -= above[i] * step[i + 1]
-    for i in range(1, n - 1):
-        step[i] = min(max(step[i], -farthest[i]), farthest[i])
-
-
-@njit(cache=True, nogil=True)
 def costs_of(factors, line):
     """Return the cost of each segment of a line, float64 (n,), the first being 0."""
     costs = np.zeros(line.shape[0])
@@ -143,24 +41,154 @@ def costs_of(factors, line):
 
 
 @njit(cache=True, nogil=True)
-def polish(free, factors, line):
-    """Move the points of a line, one at a time, to where it costs less, by compass search: what a
-    chain that was held by an obstacle leaves undone. Return the line, no two points in a row equal.
+def _set_aside(chain, i, reach, slant, beside, limits):
+    """Set the two positions beside a point of a chain; return whether there are any.
 
-    `free`, `factors`: see `settle`; `line`: float64 (n, 2), changed.
+    `reach`, `slant`: see `_moved_aside`; `beside`: float64 (3, 2), changed, the first and the last;
+    `limits`: float64 (2,), the rows and columns of the map.
+    """
+    down, over = chain[i + 1, 0] - chain[i - 1, 0], chain[i + 1, 1] - chain[i - 1, 1]
+    length = hypot(down, over)
+    if length == 0:
+        return False
+    row, col = -over / length, down / length
+    aside = _SLANT * row - slant * col, slant * row + _SLANT * col
+    for side in (0, 2):
+        for k in range(2):
+            at = np.rint((chain[i, k] + (side - 1) * reach * aside[k]) * FINE) / FINE
+            beside[side, k] = min(max(at, 0.0), limits[k])
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _moved_aside(free, factors, chain, costs, reach, slant, live):
+    """Move the points of a chain aside, each or none, so that the whole costs least, by dynamic
+    programming over the three places of each.
+
+    Parameters
+    ----------
+    free, factors
+        See `cost_line.settle`.
+    chain
+        float64 (n, 2), changed: positions; the first and the last stay.
+    costs
+        float64 (n,), changed: see `costs_of`.
+    reach
+        Cells by which points move.
+    slant
+        `_SLANT`, or less than 0 to the other side.
+    live
+        int64 (n,), changed: passes that each point takes part in still.
+    """
+    n = chain.shape[0]
+    limits = np.array([free.shape[0] + 0.0, free.shape[1] + 0.0])
+    places, before = np.empty((n, 3, 2)), np.ones((n, 3), np.int64)
+    # The least cost up to the three places of the last point and of this one; and of segments.
+    totals, following = np.array([np.inf, 0.0, np.inf]), np.empty(3)
+    segments = np.empty((n, 3))
+    for i in range(n):
+        places[i, 1] = chain[i]
+        if i == 0:
+            continue
+        # Points that have settled, and the last one, stay: they have one place.
+        moves = i < n - 1 and live[i] > 0
+        moves = moves and _set_aside(chain, i, reach, slant, places[i], limits)
+        for k in range(3):
+            least, segment, best = np.inf, np.inf, 1
+            if k == 1 or moves:
+                row, col = places[i, k]
+                # From where the last point stood; between two that stay, the cost is known.
+                if k == 1:
+                    segment = costs[i]
+                elif totals[1] < np.inf:
+                    segment = legal_cost(
+                        free, factors, chain[i - 1, 0], chain[i - 1, 1], row, col, np.inf
+                    )
+                least = totals[1] + segment
+                # From its places aside, if that saves something.
+                for j in (0, 2):
+                    if totals[j] >= least:
+                        continue
+                    near_row, near_col = places[i - 1, j]
+                    cost = legal_cost(
+                        free, factors, near_row, near_col, row, col, least - totals[j]
+                    )
+                    if totals[j] + cost < least - _SAVED:
+                        least, segment, best = totals[j] + cost, cost, j
+            following[k], segments[i, k], before[i, k] = least, segment, best
+        totals[:] = following
+    # Back from the end; points that moved and their neighbours may move again.
+    k, is_next_moved = 1, False
+    for i in range(n - 1, 0, -1):
+        costs[i] = segments[i, k]
+        if is_next_moved or k != 1 or before[i, k] != 1:
+            live[i] = _IDLE
+        else:
+            live[i] = max(live[i] - 1, 0)
+        is_next_moved = k != 1
+        if is_next_moved:
+            chain[i] = places[i, k]
+        k = before[i, k]
+
+
+@njit(cache=True, nogil=True)
+def settle_chain(free, factors, chain, costs, reach, levels, passes):
+    """Move the points of a chain aside to where it costs least: by some cells at first, by half as
+    much on each further level.
+
+    `free`, `factors`: see `cost_line.settle`; `chain`, `costs`, `reach`: see `_moved_aside`;
+    `levels`: how many there are; `passes`: most on each.
+    """
+    n, slant = chain.shape[0], _SLANT
+    live = np.empty(n, np.int64)
+    for _ in range(levels):
+        live[:] = _IDLE
+        for _ in range(passes):
+            _moved_aside(free, factors, chain, costs, reach, slant, live)
+            slant = -slant
+            is_still = True
+            for i in range(1, n - 1):
+                is_still = is_still and live[i] == 0
+            if is_still:
+                break
+        reach *= 0.5
+
+
+@njit(cache=True, nogil=True)
+def _is_by_wall(free, row, col):
+    """Return whether a cell round that of a position is blocked."""
+    rows, cols = free.shape
+    row, col = int(row), int(col)
+    for down in range(max(row - 1, 0), min(row + 2, rows)):
+        for over in range(max(col - 1, 0), min(col + 2, cols)):
+            if free[down, over] == 0:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def polish(free, factors, line, costs):
+    """Move the points of a line that lie by walls, one at a time, to where it costs less.
+
+    Compass search does what a chain that is held by an obstacle leaves undone.
+
+    `free`, `factors`: see `cost_line.settle`; `line`: float64 (n, 2), changed; `costs`: see
+    `costs_of`, changed.
     """
     n, rows, cols = line.shape[0], free.shape[0] + 0.0, free.shape[1] + 0.0
-    # How far away each point is tried, what the segment before it costs, and whether it is done.
-    reach = np.full(n, _FIRST_REACH)
-    costs = costs_of(factors, line)
-    is_still = np.zeros(n, np.bool_)
+    # How far away each point is tried.
+    reach = np.zeros(n)
+    for i in range(1, n - 1):
+        if _is_by_wall(free, line[i, 0], line[i, 1]):
+            reach[i] = _FIRST_REACH
     # Sweeps over the points that may still move.
     for sweep in range(_SWEEPS):
-        first_way = 4 * (sweep % 2)
+        first_way, is_still = 4 * (sweep % 2), True
         for i in range(1, n - 1):
-            if is_still[i]:
+            if reach[i] < _LAST_REACH:
                 continue
             # The cheapest of the places around it that its segments may lead to.
+            is_still = False
             row, col = line[i]
             whole = costs[i] + costs[i + 1]
             least, first_least = whole * (1 - _GAIN), 0.0
@@ -184,16 +212,10 @@ def polish(free, factors, line):
             if to_row != row or to_col != col:
                 line[i, 0], line[i, 1] = to_row, to_col
                 costs[i], costs[i + 1] = first_least, least - first_least
-                is_still[i - 1] = is_still[i + 1] = False
+                for k in (i - 1, i + 1):
+                    if 0 < reach[k] < _LAST_REACH:
+                        reach[k] *= 2
             else:
                 reach[i] *= 0.5
-                is_still[i] = reach[i] < _LAST_REACH
-        if total(is_still[1 : n - 1]) == n - 2:
+        if is_still:
             break
-    # Points that have met are one.
-    size = 1
-    for i in range(1, n):
-        if line[i, 0] != line[size - 1, 0] or line[i, 1] != line[size - 1, 1]:
-            line[size] = line[i]
-            size += 1
-    return line[:size].copy()

@@ -1,10 +1,9 @@
 """Kernels that settle a line where it costs least, at any angle.
 
-A line is moved as a chain that is pulled taut: its points shift to their sides, all at a time, by
-Newton's method on the integral of the factors, which are interpolated between the centres of cells
-for it. That integral has few local optima, so lines that begin near each other end on one. What a
-line costs, and whether it is legal, is decided on the cells themselves. In the end the points at
-bends, the only ones left, move one at a time, by the cost itself.
+A line is cut short, and then moved as a chain whose points shift aside, all at a time, by dynamic
+programming on the cost itself: far at first, less and less then. Points lie close only where a
+chain passes costs: elsewhere it is straight. In the end the points by walls, where no step aside
+may be legal, move one at a time.
 
 Positions are those of `taut`.
 """
@@ -16,34 +15,23 @@ from hybridnav._base.kernels.arrays import total
 from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.trig import hypot
 from hybridnav.maps.costs.integral import legal_cost
-from hybridnav.refine.kernels.chain import FINE, costs_of, polish, slopes_of, solve
+from hybridnav.refine.kernels.chain import FINE, costs_of, polish, settle_chain
 
 _SPANS = np.array([2, 3, 4, 8, 16], np.int64)
 """Segments of a line that one may replace."""
-_COARSE, _FINE_SPACING = 9.0, 3.0
-"""Cells from one point of a chain to the next: a coarse chain settles first, then a fine one."""
-_STEPS = 6
-"""Most steps of Newton's method in a round."""
-_ROUNDS = 4
-"""Most rounds of the fine chain: more than one where it is dearer than the line it came from."""
-_ALIKE = 1e-3
-"""Share by which costs differ that count as equal then."""
-_FARTHEST = 1.5
-"""Cells by which a point is moved in a step at most; half as many each time it turns back."""
-_STILL = 0.02
-"""Cells by which a chain that has settled may still move."""
-_HALVES, _SOLVED, _TRIES = 2, 5, 16
-"""Times that a step is tried because it leads off free cells. In the first ones points there make
-half of their way, later none; in the last ones the others are not solved for anew."""
+_CHAINS = np.array([[6.0, 1.5, 2.0, 4.0], [3.0, 0.6, 2.0, 3.0]])
+"""The coarse chain and the fine one: cells from point to point, cells by which points move at
+first, levels on which they do, and most passes on each."""
+_NO_COST = 1e-6
+"""Share by which a segment that passes no costs may be dearer than long, by rounding."""
 _NEAR = 1.0
 """Cells from a start within which no bend of a line is aimed at."""
 _SLACK = 1e-13
 """Rounding of a sum of costs, relative: of equal costs, the longer segment is taken."""
-_WORSE = 0.01
-"""Share by which a chain that has settled may be dearer than the line that it was: a limit that few
-meet, since lines that begin near each other are to end in one place."""
 _FLAT = 0.02
 """Cells by which points may lie off a line that leaves them out."""
+_SAVED = 0.002
+"""Share of its cost that a line must have saved by its points at walls for these to go on."""
 
 
 @njit(cache=True, nogil=True)
@@ -115,139 +103,41 @@ def _is_legal(free, factors, a, c):
 
 
 @njit(cache=True, nogil=True)
-def _spread(free, factors, line, spacing):
-    """Return a line with its points evenly spaced along it.
+def _divided(free, factors, line, spacing):
+    """Return a line with points some cells apart where it passes costs, and what its segments cost.
 
-    It has points of its own only where a shortcut past them is not legal, and is the line itself if
-    rounding makes that illegal.
+    A segment is left whole where rounding makes a part of it illegal.
     """
-    n = line.shape[0]
-    whole = 0.0
+    n, whole = line.shape[0], costs_of(factors, line)
+    parts, size = np.ones(n, np.int64), 1
     for i in range(1, n):
-        whole += hypot(line[i, 0] - line[i - 1, 0], line[i, 1] - line[i - 1, 1])
-    m = max(int(whole / spacing + 0.5), 1)
-    chain = np.empty((m + n, 2))
-    chain[0] = line[0]
-    size, passed, ahead, first = 1, 0.0, 1, 1
-    for k in range(1, m + 1):
-        # The segment that holds the next point.
-        at = line[n - 1].copy()
-        while k < m and ahead < n:
-            row, col = line[ahead - 1]
-            down, over = line[ahead, 0] - row, line[ahead, 1] - col
-            step, left = hypot(down, over), whole * k / m - passed
-            if step > left:
-                at[0] = np.rint((row + left / step * down) * FINE) / FINE
-                at[1] = np.rint((col + left / step * over) * FINE) / FINE
-                break
-            passed += step
-            ahead += 1
-        if k == m:
-            ahead = n - 1
-        if not _is_legal(free, factors, chain[size - 1], at):
-            while first < min(ahead, n - 1):
-                chain[size] = line[first]
-                size, first = size + 1, first + 1
-            if k < m and not _is_legal(free, factors, chain[size - 1], at):
-                continue  # the point before the next one is that of the line
-        first = ahead
-        chain[size] = at
-        size += 1
-    for k in range(1, size):
-        if not _is_legal(free, factors, chain[k - 1], chain[k]):
-            return line.copy()
-    return chain[:size].copy()
-
-
-@njit(cache=True, nogil=True)
-def _move(free, factors, chain, aside, step, moved, is_off):
-    """Move the points of a chain aside; return whether it stays legal.
-
-    Parameters
-    ----------
-    free, factors, chain
-        See `_settled`.
-    aside
-        See `slopes_of`.
-    step
-        float64 (n,), how far, in cells.
-    moved
-        float64 (n, 2), changed: the points after it.
-    is_off
-        bool (n,), changed: which points have a segment that is not legal.
-    """
-    rows, cols = free.shape
-    n = chain.shape[0]
-    for i in range(1, n - 1):
-        row = chain[i, 0] + step[i] * aside[i, 0]
-        col = chain[i, 1] + step[i] * aside[i, 1]
-        if step[i] != 0:
-            row, col = np.rint(row * FINE) / FINE, np.rint(col * FINE) / FINE
-        moved[i, 0], moved[i, 1] = min(max(row, 0.0), rows + 0.0), min(max(col, 0.0), cols + 0.0)
-    is_legal, is_off[:] = True, False
+        length = hypot(line[i, 0] - line[i - 1, 0], line[i, 1] - line[i - 1, 1])
+        if whole[i] > length * (1 + _NO_COST):
+            parts[i] = max(int(length / spacing + 0.5), 1)
+        size += parts[i]
+    chain, costs = np.empty((size, 2)), np.zeros(size)
+    chain[0], size = line[0], 1
     for i in range(1, n):
-        if not _is_legal(free, factors, moved[i - 1], moved[i]):
-            is_off[i - 1] = is_off[i] = True
-            is_legal = False
-    return is_legal
-
-
-@njit(cache=True, nogil=True)
-def _face_aside(chain, aside):
-    """Set the directions in which the points of a chain move: across the line past each."""
-    for i in range(1, chain.shape[0] - 1):
-        down, over = chain[i + 1, 0] - chain[i - 1, 0], chain[i + 1, 1] - chain[i - 1, 1]
-        length = hypot(down, over)
-        aside[i, 0] = -over / length if length > 0 else 0.0
-        aside[i, 1] = down / length if length > 0 else 0.0
-
-
-@njit(cache=True, nogil=True)
-def _settled(free, factors, chain, stride, steps):
-    """Return a chain whose inner points have moved to their sides until it costs least there.
-
-    `free`, `factors`: see `settle`; `chain`: float64 (n, 2), positions; `stride`: see `slopes_of`.
-    """
-    n = chain.shape[0]
-    chain, moved, best, least = chain.copy(), chain.copy(), chain.copy(), np.inf
-    is_off, held, step = np.zeros(n, np.bool_), np.empty(n), np.zeros(n)
-    # Directions and slopes at the best chain, and at the last one.
-    aside, slope, bend, link = np.zeros((n, 2)), np.zeros(n), np.zeros(n), np.zeros(n)
-    next_aside, next_slope = np.zeros((n, 2)), np.zeros(n)
-    next_bend, next_link = np.zeros(n), np.zeros(n)
-    farthest, last = np.full(n, _FARTHEST), np.zeros(n)
-    for _ in range(steps):
-        _face_aside(chain, next_aside)
-        cost = slopes_of(factors, chain, stride, next_aside, next_slope, next_bend, next_link)
-        if cost > least:  # too far: half as far, from where it was
-            farthest[:] = farthest * 0.5
-        else:
-            best, chain, least = chain, best, cost
-            aside, next_aside, slope, next_slope = next_aside, aside, next_slope, slope
-            bend, next_bend, link, next_link = next_bend, bend, next_link, link
-        # Points whose segments would leave the free cells are held, and the others solved for anew.
-        held[:], is_legal = np.nan, False
-        for k in range(_TRIES):
-            if k < _SOLVED:
-                solve(slope, bend, link, held, farthest, step)
-            is_legal = _move(free, factors, best, aside, step, moved, is_off)
-            if is_legal:
-                break
-            for i in range(1, n - 1):
-                if is_off[i]:
-                    held[i] = 0.5 * step[i] if k < _HALVES else 0.0
-                    step[i] = held[i]
-        if not is_legal:
-            return best
-        for i in range(1, n - 1):
-            if step[i] * last[i] < 0:
-                farthest[i] *= 0.5
-            last[i] = step[i]
-        chain[:] = moved
-        if total(np.abs(step) < _STILL) == step.size:
-            break
-    cost = slopes_of(factors, chain, stride, next_aside, next_slope, next_bend, next_link)
-    return best if cost > least else chain
+        row, col = line[i - 1]
+        first, m = size, parts[i]
+        for k in range(1, m + 1):
+            chain[size] = line[i]
+            if k < m:
+                share = k / m
+                chain[size, 0] = np.rint((row + share * (line[i, 0] - row)) * FINE) / FINE
+                chain[size, 1] = np.rint((col + share * (line[i, 1] - col)) * FINE) / FINE
+            costs[size] = whole[i]
+            if m > 1:
+                last_row, last_col = chain[size - 1]
+                at_row, at_col = chain[size]
+                costs[size] = legal_cost(free, factors, last_row, last_col, at_row, at_col, np.inf)
+                if costs[size] == np.inf:
+                    size = first
+                    chain[size], costs[size] = line[i], whole[i]
+                    size += 1
+                    break
+            size += 1
+    return chain[:size].copy(), costs[:size].copy()
 
 
 @njit(cache=True, nogil=True)
@@ -275,53 +165,32 @@ def _thinned(free, factors, chain):
     return kept[:size].copy()
 
 
-@njit(cache=True, nogil=True)
-def _finely_settled(free, factors, line, least):
-    """Return a line after a fine chain along it has settled: in more than one round where that is
-    dearer than another line, which costs `least`."""
-    now = np.inf
-    for _ in range(_ROUNDS):
-        before = now
-        line = _settled(free, factors, _spread(free, factors, line, _FINE_SPACING), 1.0, _STEPS)
-        now = cost_of(factors, line)
-        if now < least * (1 + _ALIKE) or now > before * (1 - _ALIKE):
-            break
-    return _thinned(free, factors, line)
-
-
 @guarded
 @njit(cache=True, nogil=True)
 def settle(free, factors, path):
-    """Return a line between the ends of a path that costs least of those near it, its cost, and
-    that of the path.
+    """Return a line between the ends of a path that costs least of those near it.
 
     The line is never dearer than the path, and its segments are legal if those of the path are.
 
     `free`: uint8 (rows, cols), 1 where a cell may be entered; `factors`: float32 (rows, cols), >=
     1; `path`: float64 (n, 2), n >= 1, positions, no two in a row equal.
     """
-    whole = cost_of(factors, path)
     if path.shape[0] < 3:
-        return path.copy(), whole, whole
+        return path.copy()
     line = _cut_short(free, factors, path)
-    best, least = line, cost_of(factors, line)
-    # A coarse chain leads far in few steps, but cuts through narrow bends.
-    chain = _settled(free, factors, _spread(free, factors, line, _COARSE), 2.0, _STEPS)
-    is_coarse = cost_of(factors, chain) < least * (1 + _WORSE)
-    line = _finely_settled(free, factors, chain if is_coarse else line, least)
-    now = cost_of(factors, line)
-    if is_coarse and now > least:
-        other = _finely_settled(free, factors, best, least)
-        if cost_of(factors, other) < now:
-            line, now = other, cost_of(factors, other)
-    # Costs that jump from cell to cell are not always those between the centres of cells.
-    if now <= least * (1 + _WORSE):
-        best, least = line, now
-    best = polish(free, factors, best)
-    least = cost_of(factors, best)
-    if least > whole:
-        return path.copy(), whole, whole
-    return best, least, whole
+    for spacing, reach, levels, passes in _CHAINS:
+        chain, costs = _divided(free, factors, line, spacing)
+        settle_chain(free, factors, chain, costs, reach, int(levels), int(passes))
+        # A straight line that costs less than points nearly on it.
+        line = _cut_short(free, factors, _thinned(free, factors, chain))
+    costs, before = costs_of(factors, line), np.inf
+    while total(costs) < before * (1 - _SAVED):
+        before = total(costs)
+        polish(free, factors, line, costs)
+        # Points that are left out may cost more again.
+        line = _thinned(free, factors, line)
+        costs = costs_of(factors, line)
+    return line if total(costs) <= cost_of(factors, path) else path.copy()
 
 
 @guarded

@@ -131,9 +131,9 @@ def _costs_towards(landmarks, starts):
 
 
 @njit(cache=True, nogil=True, _nrt=False)
-def _cost_left(landmarks, reaching, towards, node, down, over):
+def _cost_left(landmarks, reaching, towards, node, apart):
     """Return a lower bound on the cost from a node to the start, which lies so far from it."""
-    least = hypot(down, over) * (1 - _ROUNDING)
+    least = apart * (1 - _ROUNDING)
     for j in range(reaching.size):
         at = landmarks[node, reaching[j]]
         least = max(least, at - towards[1, j], towards[0, j] - at)
@@ -168,7 +168,8 @@ def _search(lattice, start, starts, goals, most, work):
         node, first = goals[0][k], goals[1][k]
         cost[node], before[node], mark[node] = first, -1, opened
         row, col = cells[node] // cols + 0.5, cells[node] % cols + 0.5
-        left[node] = _cost_left(landmarks, reaching, towards, node, row - start[0], col - start[1])
+        apart = hypot(row - start[0], col - start[1])
+        left[node] = _cost_left(landmarks, reaching, towards, node, apart)
         key = np.int64(min((first + left[node]) * _UNITS, _MOST))
         push(heap, size, key, node)
         size += 1
@@ -198,9 +199,8 @@ def _search(lattice, start, starts, goals, most, work):
             if is_new or whole < cost[other]:
                 if is_new:
                     row, col = cells[other] // cols + 0.5, cells[other] % cols + 0.5
-                    left[other] = _cost_left(
-                        landmarks, reaching, towards, other, row - start[0], col - start[1]
-                    )
+                    apart = hypot(row - start[0], col - start[1])
+                    left[other] = _cost_left(landmarks, reaching, towards, other, apart)
                 least = whole + left[other]
                 if least < most:
                     cost[other], before[other], mark[other] = whole, node, opened
