@@ -218,8 +218,7 @@ def _why_nothing(study: Study) -> str:
 def _graph(file: Path, floor: str | None) -> str | hn.graphs.WaypointGraph:
     if floor is None:
         return str(file)
-    graph: hn.graphs.WaypointGraph = extension("formats", "graph").load_graph(file, floor=floor)
-    return graph
+    return extension("formats", "graph").load_graph(file, floor=floor)
 
 
 def _yardstick(metric: str) -> Yardstick:

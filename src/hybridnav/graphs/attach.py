@@ -271,8 +271,7 @@ class PlacedGraph:
         """Return the positions that an edge passes, float64 (k, 2)."""
         if edge in self.lines:
             return self.lines[edge]
-        straight: FloatArray = self.positions[self.edges[edge]]
-        return straight
+        return self.positions[self.edges[edge]]
 
     def _is_clear(self, line: FloatArray, sight: Sight) -> bool:
         """Return whether a polyline stays in free space."""
@@ -308,5 +307,4 @@ def placed_points(
 
 def _rounded(grid: OccupancyGrid, points: FloatArray) -> FloatArray:
     """Return points as positions in grid units that exact tests of segments can use."""
-    rounded: FloatArray = np.round(grid.frame.positions_of(points) * GRAIN) / GRAIN
-    return rounded
+    return np.round(grid.frame.positions_of(points) * GRAIN) / GRAIN

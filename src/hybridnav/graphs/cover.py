@@ -47,8 +47,7 @@ class Aims:
     @cached_property
     def kept_cells(self) -> BoolArray:
         """bool (rows, cols), the cells of these parts."""
-        kept: BoolArray = np.append(self.is_kept, np.False_)[self.space.component_of]
-        return kept
+        return np.append(self.is_kept, np.False_)[self.space.component_of]
 
     @cached_property
     def rooms_to_reach(self) -> list[tuple[int, FloatArray]]:
@@ -115,8 +114,7 @@ class Aims:
 
 def _away(positions: FloatArray) -> FloatArray:
     """Return the square of the distance of each position from their mean, float64 (n,)."""
-    found: FloatArray = ((positions - positions.mean(axis=0)) ** 2).sum(axis=1)
-    return found
+    return ((positions - positions.mean(axis=0)) ** 2).sum(axis=1)
 
 
 def free_moves(rooms: Rooms, number: int, free: BoolArray) -> LongArray:

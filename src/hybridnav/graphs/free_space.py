@@ -97,8 +97,7 @@ class FreeSpace:
     @property
     def _is_large(self) -> BoolArray:
         sizes = np.bincount(self.component_of[self.free], minlength=1)
-        is_large: BoolArray = sizes * self.grid.cell_area_m2 >= LEAST_AREA_M2
-        return is_large
+        return sizes * self.grid.cell_area_m2 >= LEAST_AREA_M2
 
     def cells_at(self, positions: FloatArray) -> LongArray:
         """Return the cell that each position lies in, int64 (n, 2)."""
@@ -131,13 +130,11 @@ class FreeSpace:
             # Neighbours are always joined: no step past a corner has two blocked cells beside.
             seen = self.joins(np.repeat(chain[kept[-1:]], len(rest), axis=0), rest)
             kept.append(kept[-1] + 1 + int(np.flatnonzero(seen)[-1]))
-        found: FloatArray = chain[kept]
-        return found
+        return chain[kept]
 
     def components_at(self, positions: FloatArray) -> IntArray:
         """Return the connected part of free space that each position lies in, int32 (n,)."""
-        found: IntArray = self.component_of[tuple(self.cells_at(positions).T)]
-        return found
+        return self.component_of[tuple(self.cells_at(positions).T)]
 
     def paths(self, starts: FloatArray, goals: FloatArray) -> MeshPaths:
         """Return the shortest paths of many pairs of positions."""
@@ -196,5 +193,4 @@ def checked_position(space: FreeSpace, point: tuple[float, float]) -> FloatArray
         return None
     at = space.turn.there(np.array([space.grid.frame.position_of(*point)]))
     at = np.clip(at, cell + RIM_CELLS, cell + 1 - RIM_CELLS)
-    found: FloatArray = rounded_into(cell[None], at)[0]
-    return found
+    return rounded_into(cell[None], at)[0]

@@ -35,8 +35,7 @@ def settled(positions: FloatArray) -> FloatArray:
     """Return positions rounded, and off the sides of their cells."""
     rounded = np.round(positions * _FRACTION) / _FRACTION
     cells = np.floor(rounded)
-    found: FloatArray = cells + np.clip(rounded - cells, _RIM, 1 - _RIM)
-    return found
+    return cells + np.clip(rounded - cells, _RIM, 1 - _RIM)
 
 
 class Sketch:

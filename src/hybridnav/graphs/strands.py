@@ -117,8 +117,7 @@ def _without_specks(part_of: IntArray, most: float) -> BoolArray:
             ]
             is_speck[hole] = len(np.unique(around[around >= 0])) == 1
     is_speck[holes[0, 0]] = False
-    filled: BoolArray = (part_of >= 0) | is_speck[holes]
-    return filled
+    return (part_of >= 0) | is_speck[holes]
 
 
 def _pillars(clearance: FloatArray, layout: Layout) -> LongArray:
@@ -174,8 +173,7 @@ def _uncovered(away: FloatArray, clearance: FloatArray, layout: Layout) -> LongA
     n_cells = np.bincount(part, minlength=count + 1)[part]
     off = [n_cells * x - np.bincount(part, weights=x)[part] for x in divmod(at, far.shape[1])]
     order = np.lexsort((off[0] ** 2 + off[1] ** 2, part))
-    found: LongArray = at[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
-    return found
+    return at[order[np.flatnonzero(np.diff(part[order], prepend=0))]]
 
 
 _SIDES = ((0, 1), (-1, 0), (0, -1), (1, 0))
@@ -251,8 +249,7 @@ class Passage:
 
     def at(self, positions: FloatArray) -> FloatArray:
         """Return the clearance of positions in cells, float64 (n,)."""
-        found: FloatArray = self._clearance[tuple(positions.astype(np.int64).T)]
-        return found
+        return self._clearance[tuple(positions.astype(np.int64).T)]
 
     def least(self, tails: FloatArray, heads: FloatArray) -> FloatArray:
         """Return the least clearance of segments in cells, float64 (n,), -1 for those that the
@@ -297,8 +294,7 @@ def crosses(one: FloatArray, other: FloatArray, tails: FloatArray, heads: FloatA
     def side(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
         step, away = second - first, third - first
         across = step[..., 0] * away[..., 1] - step[..., 1] * away[..., 0]
-        found: FloatArray = np.sign(across)
-        return found
+        return np.sign(across)
 
     meets = side(tails, heads, one) * side(tails, heads, other) <= 0
     meets &= side(one, other, tails) * side(one, other, heads) <= 0

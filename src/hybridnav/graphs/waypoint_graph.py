@@ -138,8 +138,7 @@ class WaypointGraph:
     def lengths_m(self) -> FloatArray:
         """float64 (m,), distance between the two nodes of each edge in metres."""
         steps = self.points[self.edges[:, 1]] - self.points[self.edges[:, 0]]
-        found: FloatArray = hypots(steps[:, 0], steps[:, 1])
-        return found
+        return hypots(steps[:, 0], steps[:, 1])
 
     @property
     def digest(self) -> str:

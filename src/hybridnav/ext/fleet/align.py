@@ -230,8 +230,7 @@ def _poses(own: FloatArray, wanted: FloatArray) -> Iterator[Pose]:
 
 def _away(own: FloatArray, wanted: FloatArray, pose: Pose) -> FloatArray:
     """Return the distance of each end from that of the building, float64 (n,), in metres."""
-    away_m: FloatArray = hypots(*(moved_points(own, pose) - wanted).T)
-    return away_m
+    return hypots(*(moved_points(own, pose) - wanted).T)
 
 
 def _share_in_walls(points: FloatArray, free: BoolArray, grid: OccupancyGrid) -> float:

@@ -209,8 +209,7 @@ class FloorTable:
 
     def _safe(self, straight_m: FloatArray) -> FloatArray:
         """Return lengths of straight lines as lower bounds on costs."""
-        safe: FloatArray = np.maximum(straight_m - self._slack_m, 0.0) * ROUNDED
-        return safe
+        return np.maximum(straight_m - self._slack_m, 0.0) * ROUNDED
 
     def _distance_m(self, waypoint: ArrayLike | str, positions_m: FloatArray) -> FloatArray:
         """Return the distances of points from a waypoint, from the box round a named one."""

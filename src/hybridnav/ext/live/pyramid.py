@@ -193,8 +193,7 @@ class OnlinePyramid:
             )
         box = Box(*self.state.places.read([place])[0]["box"].tolist())
         cells = np.argwhere(self.state.tiles.planes(box)[0] == place)
-        field: LongArray = cells + np.array(box[:2]) - np.array(self.low)
-        return field
+        return cells + np.array(box[:2]) - np.array(self.low)
 
     @cached_property
     def pyramid(self) -> DualGraphPyramid:

@@ -84,13 +84,11 @@ class PlaceTable:
         """Return those of some numbers that are places."""
         numbers = np.array([*places], np.int64)
         numbers = numbers[self._has(numbers)]
-        used: list[int] = numbers[self.read(numbers)["area"] > 0].tolist()
-        return used
+        return numbers[self.read(numbers)["area"] > 0].tolist()
 
     def read(self, places: Sequence[int] | LongArray) -> AnyArray:
         """Return the rows of some places, `PLACE` (n,)."""
-        rows: AnyArray = self._rows[np.searchsorted(self._numbers, np.asarray(places, np.int64))]
-        return rows
+        return self._rows[np.searchsorted(self._numbers, np.asarray(places, np.int64))]
 
     def areas(self, places: Sequence[int]) -> dict[int, int]:
         """Return how many cells each of some places has."""
@@ -121,8 +119,7 @@ class PlaceTable:
     def numbers(self, first: int = 0) -> list[int]:
         """Return the numbers of all places from a first one on, ascending."""
         begin = int(np.searchsorted(self._numbers, first))
-        used: list[int] = self._numbers[begin:][self._rows["area"][begin:] > 0].tolist()
-        return used
+        return self._numbers[begin:][self._rows["area"][begin:] > 0].tolist()
 
     def append(self, first: int, rows: AnyArray) -> LongArray:
         """Enter places with the numbers from one on that is above all others; return these."""
@@ -163,14 +160,12 @@ class PlaceTable:
 
 def _rows(words: LongArray) -> AnyArray:
     """Return as rows what `_words` returned."""
-    rows: AnyArray = words.view(PLACE).reshape(len(words))
-    return rows
+    return words.view(PLACE).reshape(len(words))
 
 
 def _words(rows: AnyArray) -> LongArray:
     """Return rows as numbers, which numpy copies ten times as fast."""
-    words: LongArray = rows.view(np.int64).reshape(len(rows), PLACE.itemsize // 8)
-    return words
+    return rows.view(np.int64).reshape(len(rows), PLACE.itemsize // 8)
 
 
 class State(NamedTuple):
@@ -440,8 +435,7 @@ class _Window:
         is_large = (sides * sides).sum(axis=1) >= self._draft.limit
         for at in np.flatnonzero(is_large).tolist():
             self._contract(int(numbers[at]), boxes[at])
-        small: LongArray = numbers[~is_large]
-        return small
+        return numbers[~is_large]
 
     def _contract(self, number: int, box: LongArray) -> None:
         """Put places, as contraction makes them, in the place of one that is too large."""

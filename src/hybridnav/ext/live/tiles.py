@@ -214,8 +214,7 @@ class Tiles:
             old = *(before._get(key).place for key in some), *more
             new = *(self._get(key).place for key in some), *more
             runs, count = _tile_kernels.moved_cells(old, new, runs, count)
-        sums: LongArray = _tile_kernels.sums_of(runs, count)
-        return sums
+        return _tile_kernels.sums_of(runs, count)
 
     def differing_from(self, before: Tiles) -> list[Box]:
         """Return the boxes of the tiles that another version does not share."""

@@ -203,8 +203,7 @@ class _Answers:
             raise InvalidValueError("a tile has three whole numbers")
         zoom, row, col = map(int, numbers)
         theme: Theme = "dark" if request.query_params.get("theme") == "dark" else "light"
-        png: bytes = self._floor(request).layer(place["layer"]).png(zoom, row, col, theme)
-        return png
+        return self._floor(request).layer(place["layer"]).png(zoom, row, col, theme)
 
 
 def _error(message: str, code: int) -> JSONResponse:

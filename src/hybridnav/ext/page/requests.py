@@ -215,8 +215,7 @@ def checked_change(value: dict[str, Any]) -> Change:
     kind = _KINDS.get(op) if isinstance(op, str) else None
     if kind is None:
         raise InvalidValueError(f"op must be one of {', '.join(_KINDS)}, got {op!r:.80}")
-    change: Change = checked(kind, value)
-    return change
+    return checked(kind, value)
 
 
 # Changes of rooms: names, unions, cuts along a line, corners of outlines.
@@ -354,8 +353,7 @@ def in_grid(points_m: ArrayLike, grid: OccupancyGrid) -> list[Any]:
     points = np.asarray(points_m, dtype=np.float64)
     if not points.size:
         return []
-    positions: list[Any] = np.round(grid.frame.positions_of(points)[..., ::-1], _DECIMALS).tolist()
-    return positions
+    return np.round(grid.frame.positions_of(points)[..., ::-1], _DECIMALS).tolist()
 
 
 def in_metres(point: Sequence[float], grid: OccupancyGrid) -> tuple[float, float]:

@@ -159,15 +159,13 @@ def narrow_spots(grid: OccupancyGrid, cell: tuple[int, int]) -> LongArray:
     order = np.lexsort((cells_off[tuple(cells.T)], gaps[tuple(cells.T)]))
     _, first = np.unique(gaps[tuple(cells[order].T)], return_index=True)
     rows, cols = cells[order[first]].T
-    spots: LongArray = nearest[:, rows, cols].T.astype(np.int64)
-    return spots
+    return nearest[:, rows, cols].T.astype(np.int64)
 
 
 def _connected(grid: OccupancyGrid, cell: tuple[int, int]) -> BoolArray:
     """Return the free cells that a robot in a cell can reach, bool (rows, cols)."""
     labels, _ = ndimage.label(grid.classes == CellClass.FREE)
-    reach: BoolArray = labels == labels[cell]
-    return reach
+    return labels == labels[cell]
 
 
 _CROSS = ndimage.generate_binary_structure(2, 1)

@@ -170,8 +170,7 @@ class Robot:
         )
         room_of = self._rooms.number_of
         self.seconds["rooms"] += clock() - began
-        inside: BoolArray = room_of[tuple(goals.cells.T)] == room_of[self._at]
-        return inside
+        return room_of[tuple(goals.cells.T)] == room_of[self._at]
 
     def visit(self, goals: plans.Goals, chosen: int, *, arrives: bool) -> None:
         """Drive to a goal, or, unless the robot is to arrive there, until it is known."""

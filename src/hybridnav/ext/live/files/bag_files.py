@@ -423,8 +423,7 @@ def rotation_of(quaternion: FloatArray) -> FloatArray:
 def _applied(turn: FloatArray, other: FloatArray) -> FloatArray:
     """Return the product of a matrix and a matrix or vector, its sums in order."""
     columns = zip(turn.T, other, strict=True)
-    product: FloatArray = sum(np.multiply.outer(column, row) for column, row in columns)
-    return product
+    return sum(np.multiply.outer(column, row) for column, row in columns)
 
 
 def _blended(first: FloatArray, last: FloatArray, part: float) -> FloatArray:
@@ -437,5 +436,4 @@ def _blended(first: FloatArray, last: FloatArray, part: float) -> FloatArray:
     else:
         near, far = sin((1 - part) * angle), sin(part * angle)
         blended = (near * first + far * last) / sin(angle)
-    unit: FloatArray = blended / math.sqrt((blended * blended).sum())
-    return unit
+    return blended / math.sqrt((blended * blended).sum())

@@ -154,8 +154,7 @@ def _noisy(ranges_m: FloatArray, noise_m: float, seed: int | np.random.Generator
         ) from None
     if noise_m == 0:
         return ranges_m
-    noisy: FloatArray = np.maximum(ranges_m + rng.normal(0.0, noise_m, ranges_m.shape), 0.0)
-    return noisy
+    return np.maximum(ranges_m + rng.normal(0.0, noise_m, ranges_m.shape), 0.0)
 
 
 @dataclass(frozen=True)
