@@ -18,7 +18,7 @@ from hybridnav.graphs.free_space import RIM_CELLS, FreeSpace
 from hybridnav.graphs.joining import Nodes
 from hybridnav.graphs.kernels import least_along, least_widths
 from hybridnav.graphs.one_way import against
-from hybridnav.graphs.waypoint_graph import LANE, RouteGraph
+from hybridnav.graphs.waypoint_graph import LANE, RouteGraph, WaypointGraph
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_between, checked_type
 from hybridnav.maps.geometry import cells_of_line
@@ -27,7 +27,25 @@ from hybridnav.rooms.doors import measured_clearance_m
 from hybridnav.topology import TopologicalMap
 
 
-def node_metadata(graph: RouteGraph, node: int) -> dict[str, Any]:
+def waypoint_graph_of(graph: RouteGraph) -> WaypointGraph:
+    """Return a route graph as one of others, with what is known of nodes and edges as the fact
+    `metadata`."""
+    edges = range(graph.n_edges)
+    return WaypointGraph(
+        name=graph.grid.name,
+        format="hybridnav",
+        frame="",
+        names=tuple(graph.ids[0].tolist()),
+        points=graph.points,
+        edge_names=tuple(graph.ids[1].tolist()),
+        edges=graph.edges,
+        costs=graph.lengths_m,
+        node_facts={node: {"metadata": _of_node(graph, node)} for node in range(graph.n_nodes)},
+        edge_facts={edge: {"metadata": edge_metadata(graph, [edge])} for edge in edges},
+    )
+
+
+def _of_node(graph: RouteGraph, node: int) -> dict[str, Any]:
     """Return what is known of a node: `class`, `name`, `room`, `door`."""
     door = int(graph.doors[node]) or None
     known = {"class": graph.kinds[node], "name": graph.names[node]}

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from hybridnav._base.files import NewFile
@@ -10,7 +11,7 @@ from hybridnav._base.typing import PathLike
 from hybridnav.errors import InvalidValueError, brief
 from hybridnav.graphs import RouteGraph, WaypointGraph
 from hybridnav.graphs.files import nav2_rules as rules
-from hybridnav.graphs.lanes import edge_metadata, node_metadata
+from hybridnav.graphs.lanes import waypoint_graph_of
 from hybridnav.maps.checks import checked_type
 
 
@@ -80,9 +81,9 @@ def nav2_features(graph: RouteGraph | WaypointGraph, frame: str) -> list[dict[st
             f"the route graph has {graph.n_nodes + graph.n_edges} nodes and edges, more than the "
             f"{rules.MOST_ID} ids of Nav2: build it with fewer nodes"
         )
-    if isinstance(graph, WaypointGraph):
-        return features_of(graph, frame)
-    return [*_nodes(graph, frame), *_edges(graph)]
+    if isinstance(graph, RouteGraph):  # its facts are such as Nav2 has them
+        graph = replace(waypoint_graph_of(graph), format="nav2")
+    return _features_of(graph, frame)
 
 
 def nav2_bytes(name: str, features: Sequence[dict[str, Any]]) -> bytes:
@@ -95,35 +96,6 @@ def nav2_bytes(name: str, features: Sequence[dict[str, Any]]) -> bytes:
     return f"{head}\n{lines}\n]}}\n".encode(errors="replace")
 
 
-def _nodes(graph: RouteGraph, frame: str) -> list[dict[str, Any]]:
-    ids = graph.ids[0].tolist()
-    return [
-        _feature(
-            {"id": ids[node], "frame": frame, "metadata": node_metadata(graph, node)},
-            {"type": "Point", "coordinates": point},
-        )
-        for node, point in enumerate(graph.points.tolist())
-    ]
-
-
-def _edges(graph: RouteGraph) -> list[dict[str, Any]]:
-    points, lengths_m = graph.points.tolist(), graph.lengths_m.tolist()
-    ids, edge_ids = (each.tolist() for each in graph.ids)
-    return [
-        _feature(
-            {
-                "id": edge_ids[edge],
-                "startid": ids[tail],
-                "endid": ids[head],
-                "cost": lengths_m[edge],
-                "metadata": edge_metadata(graph, [edge]),
-            },
-            {"type": "LineString", "coordinates": [points[tail], points[head]]},
-        )
-        for edge, (tail, head) in enumerate(graph.edges.tolist())
-    ]
-
-
 def _feature(properties: dict[str, Any], geometry: dict[str, Any]) -> dict[str, Any]:
     return {"type": "Feature", "properties": properties, "geometry": geometry}
 
@@ -131,7 +103,7 @@ def _feature(properties: dict[str, Any], geometry: dict[str, Any]) -> dict[str, 
 # Features of a GeoJSON file for Nav2, of a graph that others have made.
 
 
-def features_of(graph: WaypointGraph, frame: str) -> list[dict[str, Any]]:
+def _features_of(graph: WaypointGraph, frame: str) -> list[dict[str, Any]]:
     """Return the features of a graph.
 
     Facts of a graph that is from Nav2 stay where they are; those of others go to `metadata`, with

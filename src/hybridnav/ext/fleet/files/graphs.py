@@ -25,7 +25,7 @@ from hybridnav.graphs import RouteGraph, WaypointGraph, build_lane_graph
 from hybridnav.graphs.attach import Network, placed_points
 from hybridnav.graphs.files import graphml_yaml as graph_yaml
 from hybridnav.graphs.files import json_graphs as graph_json
-from hybridnav.graphs.lanes import edge_metadata, node_metadata
+from hybridnav.graphs.lanes import waypoint_graph_of
 from hybridnav.maps.checks import checked_type
 from hybridnav.refine import Sight
 from hybridnav.rooms import Door, Rooms
@@ -282,36 +282,22 @@ def _named(door: Door, floor: str) -> str:
 
 
 def _plain(graph: RouteGraph, door_names: dict[int, str]) -> WaypointGraph:
-    """Return a route graph with its facts; a room has its name at its first node, unless that is a
-    named point."""
-    nodes: dict[int, dict[str, Any]] = {}
+    """Return a route graph with names of nodes and doors as facts; a room has its name at its first
+    node, unless that is a named point."""
+    plain = waypoint_graph_of(graph)
     named: set[str] = set()
-    for node in range(graph.n_nodes):
-        nodes[node] = {"metadata": node_metadata(graph, node)}
+    for node, facts in plain.node_facts.items():
         room = graph.rooms[node]
         if graph.names[node] is not None:
-            nodes[node]["name"] = graph.names[node]
+            facts["name"] = graph.names[node]
         elif graph.kinds[node] == "room" and room is not None and room not in named:
             named.add(room)
-            nodes[node]["name"] = room
-    edges: dict[int, dict[str, Any]] = {}
-    for edge, passed in enumerate(graph.edge_doors):
-        edges[edge] = {"metadata": edge_metadata(graph, [edge])}
-        names = [door_names[number] for number in passed if number in door_names]
+            facts["name"] = room
+    for edge, facts in plain.edge_facts.items():
+        names = [door_names[number] for number in graph.edge_doors[edge] if number in door_names]
         if names:
-            edges[edge]["door_name"] = names[0]
-    return WaypointGraph(
-        name=graph.grid.name,
-        format="hybridnav",
-        frame="",
-        names=tuple(graph.ids[0].tolist()),
-        points=graph.points,
-        edge_names=tuple(graph.ids[1].tolist()),
-        edges=graph.edges,
-        costs=graph.lengths_m,
-        node_facts=nodes,
-        edge_facts=edges,
-    )
+            facts["door_name"] = names[0]
+    return plain
 
 
 def _stubs(
