@@ -37,14 +37,13 @@ def moved_floor(floor: FloorGraph, pose: Pose) -> FloorGraph:
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import FloorGraph, moved_floor
-    >>> plain = nx.DiGraph()
-    >>> plain.add_node("dock", x=1.0, y=0.0)
-    >>> floor = FloorGraph(name="1", graph=WaypointGraph.from_networkx(plain))
-    >>> moved_floor(floor, (10.0, 0.0, np.pi / 2)).graph.points.round(6).tolist()
-    [[10.0, 1.0]]
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph, moved_floor
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = Building([Floor("0", hn.HybridPlanner(topology))])
+    >>> (floor,) = building_graph(house).floors
+    >>> moved = moved_floor(floor, (10.0, 0.0, np.pi / 2)).graph.points
+    >>> bool(np.allclose(moved, [[10 - y, x] for x, y in floor.graph.points]))
+    True
     """
     checked_type("floor", floor, FloorGraph)
     if len(pose) != 3 or not all(map(math.isfinite, pose)):  # noqa: PLR2004
@@ -86,17 +85,14 @@ def align_floors(building: BuildingGraph) -> BuildingGraph:
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, align_floors
-    >>> plain = nx.DiGraph()
-    >>> plain.add_node("dock", x=0.0, y=0.0)
-    >>> graph = WaypointGraph.from_networkx(plain)
-    >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
-    >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (5, 0)), LinkEnd("2", (2, 1))))
-    >>> aligned = align_floors(BuildingGraph(name="house", floors=floors, links=(lift,)))
-    >>> aligned.links[0].ends[1].position_m, aligned.floors[1].graph.points.tolist()
-    ((5.0, 0.0), [[3.0, -1.0]])
+    >>> from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd, align_floors
+    >>> from hybridnav.ext.fleet import building_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in "12"]
+    >>> ends = LinkEnd("1", (0.5, 0.5)), LinkEnd("2", (1.5, 0.5))
+    >>> house = Building(floors, [Link(name="lift", kind="lift", ends=ends)])
+    >>> align_floors(building_graph(house)).links[0].ends[1].position_m
+    (0.5, 0.5)
     """
     checked_type("building", building, BuildingGraph)
     poses: dict[str, Pose] = {building.floors[0].name: (0.0, 0.0, 0.0)}

@@ -80,14 +80,11 @@ class FloorGraph:
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import FloorGraph
-    >>> plain = nx.DiGraph()
-    >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> floor = FloorGraph(name="2", graph=WaypointGraph.from_networkx(plain), elevation_m=3.5)
-    >>> floor.name, floor.graph.n_nodes
-    ('2', 1)
+    >>> from hybridnav.ext.fleet import floor_graph
+    >>> from hybridnav.graphs import build_lane_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floor_graph(topology, build_lane_graph(topology), name="2", elevation_m=3.5).name
+    '2'
     """
 
     name: str
@@ -109,18 +106,11 @@ class BuildingGraph:
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd
-    >>> plain = nx.DiGraph()
-    >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> graph = WaypointGraph.from_networkx(plain)
-    >>> floors = [FloorGraph(name=name, graph=graph) for name in ("1", "2")]
-    >>> ends = LinkEnd("1", (0.5, 1.0)), LinkEnd("2", (0.5, 1.0))
-    >>> lift = Link(name="lift", kind="lift", ends=ends, ride_s=5)
-    >>> building = BuildingGraph(name="house", floors=tuple(floors), links=(lift,))
-    >>> building.floor("2").graph.n_nodes
-    1
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in "12"]
+    >>> building_graph(Building(floors), name="house").floor("2").name
+    '2'
     """
 
     name: str
@@ -188,17 +178,15 @@ def join_links(building: BuildingGraph) -> BuildingGraph:
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, join_links
-    >>> plain = nx.DiGraph()
-    >>> plain.add_node("dock", x=0.0, y=0.0)
-    >>> graph = WaypointGraph.from_networkx(plain)
-    >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
+    >>> from hybridnav.ext.fleet import Building, BuildingGraph, Floor, Link, LinkEnd
+    >>> from hybridnav.ext.fleet import building_graph, join_links
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in "12"]
+    >>> drawn = building_graph(Building(floors)).floors
     >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (3, 4)), LinkEnd("2", (3, 4))))
-    >>> joined = join_links(BuildingGraph(name="house", floors=floors, links=(lift,)))
-    >>> joined.floors[1].graph.names, joined.floors[1].graph.lengths_m.tolist()
-    (('dock', 'link lift'), [5.0, 5.0])
+    >>> joined = join_links(BuildingGraph(name="house", floors=drawn, links=(lift,)))
+    >>> joined.floors[1].graph.names[-1]
+    'link lift'
     """
     checked_type("building", building, BuildingGraph)
     floors = []
@@ -233,17 +221,11 @@ def to_networkx(building: BuildingGraph) -> nx.MultiDiGraph[Any]:
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph, Link, LinkEnd, to_networkx
-    >>> plain = nx.DiGraph()
-    >>> plain.add_node("dock", x=0.0, y=0.0)
-    >>> graph = WaypointGraph.from_networkx(plain)
-    >>> floors = tuple(FloorGraph(name=name, graph=graph) for name in ("1", "2"))
-    >>> lift = Link(name="lift", kind="lift", ends=(LinkEnd("1", (0, 0)), LinkEnd("2", (0, 0))))
-    >>> whole = to_networkx(BuildingGraph(name="house", floors=floors, links=(lift,)))
-    >>> sorted(whole.edges())
-    [(('1', 'dock'), ('2', 'dock')), (('2', 'dock'), ('1', 'dock'))]
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph, to_networkx
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> floors = [Floor(name, hn.HybridPlanner(topology)) for name in "12"]
+    >>> list(to_networkx(building_graph(Building(floors))))[0]
+    ('1', 0)
     """
     import networkx as nx  # noqa: PLC0415 - on demand
 

@@ -261,18 +261,11 @@ def export_lif(
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> from hybridnav.ext.fleet import export_lif
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph
-    >>> plain = nx.Graph()
-    >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> plain.add_node("gate", x=3.5, y=5.0)
-    >>> plain.add_edge("dock", "gate")
-    >>> floor = FloorGraph(name="0", graph=WaypointGraph.from_networkx(plain))
-    >>> building = BuildingGraph(name="house", floors=(floor,))
-    >>> export_lif(building, "house.lif.json", vehicle_types=["Maker.Carrier"])
-    ()
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph, export_lif
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = Building([Floor("0", hn.HybridPlanner(topology))])
+    >>> export_lif(building_graph(house), "house.lif.json", vehicle_types=["Maker.Carrier"])
+    ('elevations of floors',)
     """
     checked_type("building", building, BuildingGraph)
     file = NewFile.named(path, "layout", "a layout", (".json", ".lif"))

@@ -75,17 +75,11 @@ def export_osm(building: BuildingGraph, path: PathLike, *, anchor: Anchor) -> tu
 
     Examples
     --------
-    >>> from hybridnav.ext.fleet import Anchor, export_osm
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph
-    >>> plain = nx.Graph()
-    >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> plain.add_node("gate", x=3.5, y=5.0)
-    >>> plain.add_edge("dock", "gate")
-    >>> floor = FloorGraph(name="0", graph=WaypointGraph.from_networkx(plain))
-    >>> building = BuildingGraph(name="house", floors=(floor,))
-    >>> export_osm(building, "house.osm", anchor=Anchor(48.15, 11.57, heading_deg=30))
+    >>> from hybridnav.ext.fleet import Anchor, Building, Floor, building_graph, export_osm
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = Building([Floor("0", hn.HybridPlanner(topology))])
+    >>> anchor = Anchor(48.15, 11.57, heading_deg=30)
+    >>> export_osm(building_graph(house), "house.osm", anchor=anchor)
     ()
     """
     checked_type("building", building, BuildingGraph)

@@ -75,16 +75,10 @@ def export_rmf(
 
     Examples
     --------
-    >>> from hybridnav.graphs import WaypointGraph
-    >>> from hybridnav.ext.fleet import export_rmf
-    >>> import networkx as nx
-    >>> from hybridnav.ext.fleet import BuildingGraph, FloorGraph
-    >>> plain = nx.Graph()
-    >>> plain.add_node("dock", x=0.5, y=1.0)
-    >>> plain.add_node("gate", x=3.5, y=5.0)
-    >>> plain.add_edge("dock", "gate")
-    >>> floor = FloorGraph(name="L1", graph=WaypointGraph.from_networkx(plain))
-    >>> export_rmf(BuildingGraph(name="house", floors=(floor,)), "house.yaml")
+    >>> from hybridnav.ext.fleet import Building, Floor, building_graph, export_rmf
+    >>> topology = hn.TopologicalMap(hn.DualGraphPyramid.build(hn.example_map("figure1")))
+    >>> house = Building([Floor("0", hn.HybridPlanner(topology))])
+    >>> export_rmf(building_graph(house), "house.yaml")
     ()
     """
     checked_type("building", building, BuildingGraph)
