@@ -132,63 +132,61 @@ class _Answers:
         gets: dict[str, Callable[[Request], Any]] = {
             f"{at}/map.json": lambda _: self._shown.describe(),
             f"{at}/state.json": lambda _: self._shown.state(),
-            f"{at}/closed.json": lambda _: self._shown.site.changes(),
+            f"{at}/closed.json": lambda _: self._site.changes(),
             f"{floor}/map.json": lambda request: self._floor(request).describe(),
             f"{floor}/rooms.json": lambda request: on(request).describe_rooms(),
             f"{floor}/outlines.json": lambda request: on(request).outlines(),
             f"{floor}/graph/{{level}}.json": lambda one: on(one).graph(one.path_params["level"]),
             f"{floor}/costs/{{preset}}.json": lambda one: on(one).costs(one.path_params["preset"]),
         }
-        posts: dict[str, tuple[type[BaseModel], Callable[[Request, Any], Any]]] = {
-            f"{at}/plan": (ask.PlanQuery, lambda _, query: self._planned(query)),
-            f"{at}/optimum": (ask.PlanQuery, lambda _, query: self._planned(query, **_OPTIMUM)),
+        posts: dict[str, tuple[Any, ...]] = {
+            f"{at}/plan": (lambda _, query: self._planned(query), ask.PlanQuery),
+            f"{at}/optimum": (lambda _, query: self._planned(query, **_OPTIMUM), ask.PlanQuery),
             f"{at}/closed": (
+                lambda _, change: self._site.closings.describe(change),
                 ask.ClosingChange,
-                lambda _, change: self._shown.site.closings.describe(change),
             ),
             f"{at}/alternatives": (
+                lambda _, query: self._site.routes(query).alternatives(query),
                 ask.AlternativesQuery,
-                lambda _, query: self._shown.site.routes(query).alternatives(query),
             ),
-            f"{at}/find": (
-                ask.Find,
-                lambda _, asked: self._finder.find(self._shown.site.named, asked),
-            ),
+            f"{at}/find": (lambda _, asked: self._finder.find(self._site.named, asked), ask.Find),
             f"{at}/favour": (
+                lambda _, asked: self._finder.favour(self._site.named, asked),
                 ask.Favour,
-                lambda _, asked: self._finder.favour(self._shown.site.named, asked),
             ),
-            f"{floor}/stand": (ask.Stand, lambda request, asked: on(request).stand(asked)),
-            f"{floor}/at": (ask.At, lambda request, asked: on(request).room_at(asked)),
-            f"{floor}/edit": (ask.Edit, lambda request, asked: on(request).edit(asked)),
-            f"{floor}/undo": (ask.Undo, lambda request, asked: on(request).undo(asked.version)),
-            f"{floor}/save": (ask.Save, lambda request, asked: on(request).save(asked)),
+            f"{floor}/stand": (lambda request, asked: on(request).stand(asked), ask.Stand),
+            f"{floor}/at": (lambda request, asked: on(request).room_at(asked), ask.At),
+            f"{floor}/edit": (lambda request, asked: on(request).edit(asked), ask.Edit),
+            f"{floor}/undo": (lambda request, asked: on(request).undo(asked.version), ask.Undo),
+            f"{floor}/save": (lambda request, asked: on(request).save(asked), ask.Save),
+            f"{at}/export/{{kind}}": (self._export,),
+            f"{floor}/export/{{kind}}": (self._export_floor,),
         }
-        files = {at: self._export, floor: self._export_floor}
         tile = f"{floor}/tile/{{layer}}/{{zoom}}/{{row}}/{{col}}.png"
         return [
             Route(tile, _get(self._tile, "image/png")),
-            *(Route(path, _get_json(answer)) for path, answer in gets.items()),
+            *(Route(path, _get(answer)) for path, answer in gets.items()),
             *(Route(path, _post(*each), methods=["POST"]) for path, each in posts.items()),
-            *(
-                Route(f"{above}/export/{{kind}}", _post_file(answer), methods=["POST"])
-                for above, answer in files.items()
-            ),
             *tools.routes(at, floor),
         ]
+
+    @property
+    def _site(self) -> Site:
+        return self._shown.site
 
     def _floor(self, request: Request) -> Any:
         return self._shown.floor(request.path_params["floor"])
 
     def _session(self, request: Request) -> Session:
         """Return the session of the floor in an address, once it is there."""
-        return self._shown.site.floor(request.path_params["floor"])
+        return self._site.floor(request.path_params["floor"])
 
     def _planned(self, query: ask.PlanQuery, **update: Any) -> dict[str, Any]:
-        return self._shown.site.routes(query).plan(query.model_copy(update=update))
+        return self._site.routes(query).plan(query.model_copy(update=update))
 
     def _export(self, request: Request, value: Any) -> tuple[str, bytes]:
-        site, query = self._shown.site, ask.checked(ask.PartQuery, value) if value else None
+        site, query = self._site, ask.checked(ask.PartQuery, value) if value else None
         return pages.exported(site, request.path_params["kind"], query, self._folder)
 
     def _export_floor(self, request: Request, _: Any) -> tuple[str, bytes]:
@@ -226,59 +224,46 @@ async def _done(work: Callable[[], Any]) -> Any:
         return _error(f"cannot write: {error.strerror}", _FULL)
 
 
-def _get(read: Callable[[Any], Any], kind: str) -> Any:
-    async def answer(request: Request) -> Response:
-        content = await _done(lambda: read(request))
-        if isinstance(content, Response):
-            return content
-        return Response(content, media_type=kind, headers={"cache-control": "no-cache"})
-
-    return answer
-
-
 def _asset_reader(name: str) -> Callable[[Any], str]:
     return lambda _: pages.asset(name)
 
 
-def _get_json(read: Callable[[Any], Any]) -> Any:
+def _get(read: Callable[[Request], Any], kind: str | None = None) -> Any:
+    """Return what answers with content of a kind, None for JSON."""
+
     async def answer(request: Request) -> Response:
-        return _json(await _done(lambda: read(request)))
+        return _response(await _done(lambda: read(request)), kind)
 
     return answer
 
 
-def _post(kind: type[BaseModel], act: Callable[[Request, Any], Any]) -> Any:
-    async def answer(request: Request) -> Response:
-        value = await _body(request)
-        if isinstance(value, Response):
-            return value
-        return _json(await _done(lambda: act(request, ask.checked(kind, value))))
+def _post(act: Callable[[Request, Any], Any], kind: type[BaseModel] | None = None) -> Any:
+    """Return what answers a value, of a kind of requests if one is given."""
 
-    return answer
-
-
-def _post_file(read: Callable[[Request, Any], tuple[str, bytes]]) -> Any:
     async def answer(request: Request) -> Response:
         value = await _body(request)
         if isinstance(value, Response):
             return value
-        file = await _done(lambda: read(request, value))
-        if isinstance(file, Response):
-            return file
-        name, content = file
-        headers = {
-            "content-disposition": f'attachment; filename="{name}"',
-            "cache-control": "no-store",
-        }
-        return Response(content, media_type="application/octet-stream", headers=headers)
+
+        def act_on_checked() -> Any:
+            return act(request, value if kind is None else ask.checked(kind, value))
+
+        return _response(await _done(act_on_checked))
 
     return answer
 
 
-def _json(answer: Any) -> Response:
-    if isinstance(answer, Response):
-        return answer
-    return JSONResponse(answer, headers={"cache-control": "no-store"})
+def _response(content: Any, kind: str | None = None) -> Response:
+    """Return the response with JSON, content of another kind, or a file by its name and content."""
+    if isinstance(content, Response):
+        return content
+    if kind is not None:
+        return Response(content, media_type=kind, headers={"cache-control": "no-cache"})
+    headers = {"cache-control": "no-store"}
+    if not isinstance(content, tuple):
+        return JSONResponse(content, headers=headers)
+    headers["content-disposition"] = f'attachment; filename="{content[0]}"'
+    return Response(content[1], media_type="application/octet-stream", headers=headers)
 
 
 async def _body(request: Request) -> Any:
