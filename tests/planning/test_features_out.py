@@ -235,7 +235,7 @@ TOPOLOGY = hn.TopologicalMap(hn.DualGraphPyramid.build(GRID))
 )
 def test_what_cannot_be_written_is_refused_in_one_line(export, thing, tmp_path):
     for name, kind, words in (
-        ("out.txt", hn.errors.MapError, r"must end in \.csv"),
+        ("out.txt", hn.errors.MapError, r"must be named \.csv"),
         ("none/out.csv", hn.errors.MapError, "cannot write: No such file"),
         ("folder.csv", hn.errors.MapError, "cannot write: Is a directory"),
     ):

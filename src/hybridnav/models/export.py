@@ -9,14 +9,13 @@ import itertools
 import json
 import math
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hybridnav._base.files import printable, replace_file
+from hybridnav._base.files import NewFile, printable
 from hybridnav._base.typing import FloatArray, PathLike, SignArray
-from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.errors import InvalidValueError
 from hybridnav.guide import Tour
 from hybridnav.maps import CellClass
 from hybridnav.maps.checks import checked_type
@@ -80,22 +79,22 @@ def export_path(
     results = outcome.results if isinstance(outcome, Tour) else (outcome,)
     for result in results:
         checked_type("outcome", result, PlanResult)
-    file = _checked(path, _PATH_ENDINGS, frame)
+    file = _file(path, "a path", _PATH_ENDINGS, frame)
     planned = [result for result in results if result.path is not None]
     tracks, began_s = [], 0.0
     for result in planned:
         tracks.append(_poses(result, spacing_m, began_s))
         began_s += result.duration_s or 0.0
-    if file.suffix.lower() in _FEATURES:
+    if file.path.suffix.lower() in _FEATURES:
         lines = [_line(result, track) for result, track in zip(planned, tracks, strict=True)]
-        _write(file, _collection(lines, frame))
+        file.write(_collection(lines, frame))
         return
     rows = _distinct(list(itertools.chain.from_iterable(tracks)))
     names = _POSE if results[0].limits is None else _POSE + _DRIVEN
-    if file.suffix.lower() == _PLAIN:
-        _write(file, json.dumps({"names": names, "poses": rows}, allow_nan=False) + "\n")
+    if file.path.suffix.lower() == _PLAIN:
+        file.write((json.dumps({"names": names, "poses": rows}, allow_nan=False) + "\n").encode())
     else:
-        _write(file, _table(names, rows))
+        file.write(_table(names, rows))
 
 
 def export_rooms(
@@ -149,26 +148,26 @@ def export_rooms(
     checked_type("rooms", rooms, Rooms)
     if not 0 < tolerance_m < math.inf:
         raise InvalidValueError(f"tolerance_m must be positive and finite, got {tolerance_m}")
-    file = _checked(path, _MAP_ENDINGS, frame)
+    file = _file(path, "a file of rooms", _MAP_ENDINGS, frame)
     # These load scipy and shapely.
     from hybridnav.rooms.files.entries import Read  # noqa: PLC0415
     from hybridnav.rooms.files.outlines import outlines_of  # noqa: PLC0415
     from hybridnav.rooms.files.read import check_rooms  # noqa: PLC0415
 
-    read = Read(f"rooms {printable(file)}", list(rooms.names))
+    read = Read(f"rooms {printable(file.path)}", list(rooms.names))
     check_rooms(read, rooms.labels.label_of, rooms.grid)
     doors = [door for door in rooms.doors if not door.is_gap] if everything else rooms.listed_doors
     shown = [everything or is_listed for is_listed in rooms.is_listed.tolist()]
     known = [_room(rooms, label, doors) for label, is_one in enumerate(shown) if is_one]
-    if file.suffix.lower() == _TABLE:
-        _write(file, _table(_ROOM, (_texts(room) for room in known)))
+    if file.path.suffix.lower() == _TABLE:
+        file.write(_table(_ROOM, map(_texts, known)))
         return
     outlines = outlines_of(rooms.labels.label_of, len(rooms.names), rooms.grid, tolerance_m)
     features = [
         _feature({"feature": "room"} | room, _area(rings))
         for room, rings in zip(known, itertools.compress(outlines, shown), strict=True)
     ]
-    _write(file, _collection(features + [_door(door) for door in doors], frame))
+    file.write(_collection(features + [_door(door) for door in doors], frame))
 
 
 def export_places(topology: TopologicalMap, path: PathLike, *, frame: str = "map") -> None:
@@ -205,15 +204,15 @@ def export_places(topology: TopologicalMap, path: PathLike, *, frame: str = "map
     0,2.5,0.5,free,4.0,
     """
     checked_type("topology", topology, TopologicalMap)
-    file = _checked(path, _MAP_ENDINGS, frame)
+    file = _file(path, "a file of places", _MAP_ENDINGS, frame)
     places = [_place(topology, place) for place in range(topology.n_places)]
-    if file.suffix.lower() == _TABLE:
-        _write(file, _table(_PLACE, (_texts(place) for place in places)))
+    if file.path.suffix.lower() == _TABLE:
+        file.write(_table(_PLACE, map(_texts, places)))
         return
     features = [
         _feature({"feature": "place"} | place, _point(place["x"], place["y"])) for place in places
     ]
-    _write(file, _collection(features + _arcs(topology), frame))
+    file.write(_collection(features + _arcs(topology), frame))
 
 
 def _poses(result: PlanResult, spacing_m: float, began_s: float) -> list[list[float]]:
@@ -339,19 +338,19 @@ def _feature(properties: dict[str, Any], geometry: dict[str, Any]) -> dict[str, 
     return {"type": "Feature", "properties": known, "geometry": geometry}
 
 
-def _collection(features: Iterable[dict[str, Any]], frame: str) -> str:
+def _collection(features: Iterable[dict[str, Any]], frame: str) -> bytes:
     """Return a file of features, one a line, so that people can read and compare files."""
     lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
     head = f'{{"type": "FeatureCollection", "frame": {json.dumps(frame)}, "features": ['
-    return f"{head}\n{lines}\n]}}\n"
+    return f"{head}\n{lines}\n]}}\n".encode()
 
 
-def _table(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def _table(names: Sequence[str], rows: Iterable[Sequence[Any]]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)
     writer.writerows(rows)
-    return text.getvalue()
+    return text.getvalue().encode()
 
 
 def _texts(values: dict[str, Any]) -> list[Any]:
@@ -369,17 +368,8 @@ def _rounded(value: float) -> float:
     return round(value, _DECIMALS) + 0.0
 
 
-def _checked(path: PathLike, endings: Sequence[str], frame: str) -> Path:
-    file = Path(path)
-    if file.suffix.lower() not in endings:
-        raise MapError(f"file {printable(file)}: the name must end in {', '.join(endings)}")
+def _file(path: PathLike, kind: str, endings: tuple[str, ...], frame: str) -> NewFile:
+    file = NewFile.named(path, "file", kind, endings)
     if not isinstance(frame, str) or not frame:
         raise InvalidValueError(f"frame must be the name of the map frame, got {frame!r:.80}")
     return file
-
-
-def _write(file: Path, text: str) -> None:
-    try:
-        replace_file(file, text.encode())
-    except OSError as error:
-        raise MapError(f"file {printable(file)}: cannot write: {error.strerror}") from None

@@ -14,7 +14,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from hybridnav._base.files import printable, replace_file
+from hybridnav._base.files import NewFile, printable
 from hybridnav._base.typing import PathLike
 from hybridnav.errors import HybridNavError, InvalidValueError, MapError
 from hybridnav.ext.page.drawing import map_facts
@@ -158,10 +158,7 @@ def save_page(site: Site, path: PathLike, queries: Sequence[PlanQuery] = ()) -> 
             for query in queries
         ],
     }
-    try:
-        replace_file(Path(path), whole_page(data).encode())
-    except OSError as error:
-        raise MapError(f"page {printable(path)}: cannot write: {error.strerror}") from None
+    NewFile(Path(path), f"page {printable(path)}").write(whole_page(data).encode())
     return len(plans) + len(queries)
 
 
