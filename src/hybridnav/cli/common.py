@@ -14,7 +14,7 @@ from typing import Any
 
 import hybridnav as hn
 from hybridnav._base.clock import clock
-from hybridnav._base.files import check_replaceable, printable, without_controls
+from hybridnav._base.files import check_replaceable, printable, replace_file, without_controls
 from hybridnav._base.progress import Progress, no_progress
 from hybridnav.errors import HybridNavError, MapError, PresetError
 
@@ -154,6 +154,14 @@ def check_writable(path: Path, option: str) -> None:
         check_replaceable(path)
     except OSError as error:
         raise UsageError(f"{option}: cannot write '{printable(path)}': {error.strerror}") from None
+
+
+def write_out(path: Path, text: str) -> None:
+    """Write the file that `--out` names."""
+    try:
+        replace_file(path, text.encode())
+    except OSError as error:
+        raise UsageError(f"--out: cannot write '{printable(path)}': {error.strerror}") from None
 
 
 def extent_line(grid: hn.OccupancyGrid) -> str:

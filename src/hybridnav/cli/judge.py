@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 import hybridnav as hn
-from hybridnav._base.files import printable, replace_file
 from hybridnav.cli import options
 from hybridnav.cli.common import (
     EXIT_NOT_SOLVED,
@@ -20,6 +19,7 @@ from hybridnav.cli.common import (
     check_output,
     check_picture,
     stage,
+    write_out,
 )
 from hybridnav.cli.map_options import MapOptions
 from hybridnav.cli.options import option
@@ -152,10 +152,7 @@ def _write(args: JudgeOptions, grid: hn.OccupancyGrid, named: list[tuple[str, Ju
         lines = [line for name, found in named for line in _lines(name, found)]
         answer(to_markdown(rows) + "".join(f"\n{line}" for line in lines) + "\n")
     if args.out is not None:
-        try:
-            replace_file(args.out, to_csv(rows).encode())
-        except OSError as error:
-            raise UsageError(f"--out '{printable(args.out)}': {error.strerror}") from None
+        write_out(args.out, to_csv(rows))
     if args.plot is not None:
         from hybridnav import viz  # noqa: PLC0415 - matplotlib on demand
 

@@ -5,6 +5,7 @@ One declaration each: what a command makes of it stands in the command's own tex
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
@@ -18,6 +19,7 @@ from hybridnav._base.extension import extension
 from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError
 from hybridnav.errors import InvalidValueError, MapError
+from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
     from hybridnav.maps.costs.files import CostSpec
@@ -272,6 +274,17 @@ class Closing:
             own = Blocked(named={name: load_blocked(mask.file, grid, keepout=True, pose=mask.pose)})
             closed |= own
         return closed | Blocked(named=named)
+
+
+def parsed_point(text: str, flag: str) -> tuple[float, float]:
+    """Return the point that an option states as X,Y.
+
+    Raises `UsageError` when it is none.
+    """
+    point = read_point(text)
+    if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
+        raise UsageError(f"{flag} must be two finite numbers X,Y in metres, got {text!r:.80}")
+    return point[0], point[1]
 
 
 def closing_lines(figures: dict[str, Any]) -> list[str]:

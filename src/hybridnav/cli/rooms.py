@@ -30,7 +30,6 @@ from hybridnav.cli.map_options import MapOptions
 from hybridnav.cli.options import option
 from hybridnav.cli.reading import check_room_to_be
 from hybridnav.maps import CellClass
-from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
     from hybridnav._base.typing import FloatArray
@@ -185,10 +184,7 @@ def _point_of(args: RoomsOptions) -> Point | None:
         return None
     if args.out is not None or args.plot is not None:
         raise UsageError("--at prints one room: leave out --out and --plot")
-    point = read_point(args.at)
-    if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-        raise UsageError(f"--at must be two finite numbers X,Y in metres, got {args.at!r:.80}")
-    return point[0], point[1]
+    return options.parsed_point(args.at, "--at")
 
 
 def _room_at(point: Point, labels: RoomLabels, grid: hn.OccupancyGrid) -> dict[str, Any]:

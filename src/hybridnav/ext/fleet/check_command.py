@@ -85,7 +85,7 @@ def _check_over_floors(args: CheckOptions) -> None:
         lines.append(f"hint       {away}: --align, if floors have other frames than their maps")
     respond(_building_figures(check, report, wrong), lines, seconds, as_json=args.as_json)
     if args.out is not None:
-        telling.write_page(render_building_check(check, report), args.out)
+        common.write_out(args.out, render_building_check(check, report))
     # An answer that the building contradicts is an error.
     _end(wrong, args.fail_on, is_refuted=bool(cases))
 
@@ -210,7 +210,7 @@ def check(args: CheckOptions) -> None:
     facts = [(name, printable(text)) for name, text in check_facts(checked)]
     respond(_figures(checked, wrong[""]), _summary(facts, wrong), seconds, as_json=args.as_json)
     if args.out is not None:
-        telling.write_page(render_check(checked), args.out)
+        common.write_out(args.out, render_check(checked))
     if args.plot is not None:
         from hybridnav.graphs import plot_graph_check  # noqa: PLC0415 - on demand
         from hybridnav.viz import save_figure  # noqa: PLC0415 - on demand

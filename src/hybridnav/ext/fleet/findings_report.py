@@ -5,10 +5,9 @@ from __future__ import annotations
 import base64
 from collections.abc import Iterable
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
-from hybridnav._base.files import printable, replace_file
+from hybridnav._base.files import printable
 from hybridnav.cli.common import UsageError
 from hybridnav.cli.options import option
 
@@ -81,14 +80,6 @@ def found_figures(findings: Iterable[Finding]) -> dict[str, Any]:
         }
         for each in findings
     }
-
-
-def write_page(page: str, out: Path) -> None:
-    """Write a page on what was found."""
-    try:
-        replace_file(out, page.encode())
-    except OSError as error:
-        raise UsageError(f"--out: cannot write '{printable(out)}': {error.strerror}") from None
 
 
 # The page on a graph that was checked, in one HTML text.

@@ -14,7 +14,6 @@ from hybridnav.cli.options import option
 from hybridnav.cli.reading import check_room_to_be
 from hybridnav.ext.live.map_command import map_lines
 from hybridnav.maps import DEFAULT_MAX_CELLS
-from hybridnav.maps.names import read_point
 
 if TYPE_CHECKING:
     from hybridnav.ext.live.explore import By, Exploration, Step
@@ -66,7 +65,7 @@ def explore(
 
     Example: hybridnav explore maps/figure1/figure1.yaml --robot-radius 0.1 --most-goals 3
     """
-    point = None if start is None else _point(start)
+    point = None if start is None else options.parsed_point(start, "--start")
     common.check_output(out, "--out", (".yaml", ".yml"))
     if out is not None:
         common.check_writable(out.with_suffix(".pgm"), "--out")
@@ -132,15 +131,6 @@ def _rule(text: str) -> By:
             f"--by must be one of {', '.join(get_args(By))}, got {printable(text)}"
         )
     return cast("By", text)
-
-
-def _point(text: str) -> tuple[float, float]:
-    point = read_point(text)
-    if point is None or len(point) != 2 or not all(map(math.isfinite, point)):  # noqa: PLR2004
-        raise common.UsageError(
-            f"--start must be two finite numbers X,Y in metres, got {text!r:.80}"
-        )
-    return point[0], point[1]
 
 
 def _check_replaces(map_file: Path, out: Path) -> None:
