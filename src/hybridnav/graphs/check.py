@@ -119,8 +119,7 @@ def check_graph(
     rooms = topology.room_labels
     is_beyond = (component >= 0) & space.outside(rooms)[component]
     _add_nodes(findings, graph, placed, grid, component)
-    _add_edges(findings, graph, placed, space, is_clear)
-    _add_against(findings, topology, graph, placed, np.flatnonzero(is_clear))
+    _add_edges(findings, topology, (graph, placed), space, is_clear)
     is_kept = space.kept(None if rooms is None else topology.rooms)
     add_components(findings, graph, component, is_beyond)
     _add_parts(findings, space, is_kept, component)
@@ -169,11 +168,14 @@ def _add_nodes(
 
 def _add_edges(
     findings: Findings,
-    graph: WaypointGraph,
-    placed: PlacedGraph,
+    topology: TopologicalMap,
+    known: tuple[WaypointGraph, PlacedGraph],
     space: FreeSpace,
     is_clear: BoolArray,
 ) -> None:
+    """Add edges that the robot cannot follow, that Nav2 cannot, against a one-way door or line of
+    the rooms, and loops and repeated ones."""
+    graph, placed = known
     points, edges = graph.points.tolist(), graph.edges
 
     def add(kind: str, which: LongArray, where: list[str]) -> None:
@@ -185,13 +187,12 @@ def _add_edges(
             )
 
     blocked = np.flatnonzero(~is_clear)
-    known = space.free | (space.grid.classes == CellClass.UNEXPLORED)
-    if len(blocked) and not np.array_equal(known, space.free):
+    enterable = space.free | (space.grid.classes == CellClass.UNEXPLORED)
+    whole = is_clear
+    if len(blocked) and not np.array_equal(enterable, space.free):
         along = bool(placed.lines)
-        others = PlacedGraph.of(graph, space.grid, known, along_lines=along)
-        whole = others.clear_edges(Sight(known))
-    else:
-        whole = is_clear
+        others = PlacedGraph.of(graph, space.grid, enterable, along_lines=along)
+        whole = others.clear_edges(Sight(enterable))
     for kind, which in (
         ("edge-through-wall", blocked[~whole[blocked]]),
         ("edge-unexplored", blocked[whole[blocked]]),
@@ -201,6 +202,12 @@ def _add_edges(
         driven = np.setdiff1d(np.flatnonzero(is_clear), list(placed.lines))
         ends = (placed.cells[edges[driven, end]] for end in (0, 1))
         add("edge-walk", driven[~walks_clear(space.free, *ends)], [])
+    clear = np.flatnonzero(is_clear)
+    add(
+        "edge-against",
+        clear[against(topology, map(placed.line_of, clear.tolist()), placed.free)],
+        [],
+    )
     is_loop = edges[:, 0] == edges[:, 1]
     add("loop", np.flatnonzero(is_loop), [])
     keys = edges[:, 0] * graph.n_nodes + edges[:, 1]
@@ -208,20 +215,6 @@ def _add_edges(
     is_again = np.ones(len(edges), dtype=np.bool_)
     is_again[first] = False
     add("repeated-edge", np.flatnonzero(is_again & ~is_loop), [])
-
-
-def _add_against(
-    findings: Findings,
-    topology: TopologicalMap,
-    graph: WaypointGraph,
-    placed: PlacedGraph,
-    clear: LongArray,
-) -> None:
-    """Add edges that cross a one-way door or line of the rooms against its direction."""
-    wrong = against(topology, map(placed.line_of, clear.tolist()), placed.free)
-    for edge in clear[wrong].tolist():
-        tail, head = (tuple(graph.points[at].tolist()) for at in graph.edges[edge])
-        findings.add("edge-against", graph.edge_text(edge), tail, head)
 
 
 def _blocked_at(placed: PlacedGraph, space: FreeSpace, which: LongArray) -> list[str]:

@@ -80,14 +80,7 @@ BUILDING_KINDS = {
 _WARNINGS = frozenset(
     {
         *("line-elsewhere", "node-unexplored", "node-beyond", "edge-unexplored", "edge-walk"),
-        *(
-            "loop",
-            "repeated-edge",
-            "same-point",
-            "alone",
-            "floor-missing",
-            "floor-unknown",
-        ),
+        *("loop", "repeated-edge", "same-point", "alone", "floor-missing", "floor-unknown"),
         *("link-missing", "link-kind", "link-unread", "stop-missing", "fails-later"),
         *("stop-unread", "level-unaligned", "fiducial-off", "scale-unsure", "missing-named-room"),
     }

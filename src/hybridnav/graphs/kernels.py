@@ -229,13 +229,14 @@ def _is_simple(inside, row, col):
 @guarded
 @njit(cache=True, nogil=True)
 def thinned(inside, clearance, order, anchors):
-    """Thin a set of cells to 4-connected lines, the cells nearest to obstacles first.
+    """Thin a set of cells to 4-connected lines, the cells nearest to obstacles first (C. Pudney:
+    Distance-ordered homotopic thinning, 1998).
 
-    `inside`: bool (rows, cols), changed in place; false along its rim; `clearance`: float64 (rows,
-    cols); `order`: int64 (k,), the flat cells of the set by clearance; `anchors`: bool (rows,
-    cols), cells that stay; `Notes`: ; `-----`: ; `C. Pudney: Distance-ordered homotopic thinning`,
-    `1998. A cell that had to stay is tried again as`: ; `soon as a neighbour goes: so ends without
-    an anchor shrink away.`: ."""
+    A cell that had to stay is tried again as soon as a neighbour goes: so ends without an anchor
+    shrink away. `inside`: bool (rows, cols), changed in place; false along its rim; `clearance`:
+    float64 (rows, cols); `order`: int64 (k,), the flat cells of the set by clearance; `anchors`:
+    bool (rows, cols), cells that stay.
+    """
     cols = inside.shape[1]
     waiting = np.empty(8 * len(order) + 8, np.int64)
     for k in range(len(order)):
@@ -261,9 +262,10 @@ def thinned(inside, clearance, order, anchors):
 def spread(free, sources):
     """Return how many steps each cell lies from the nearest of some cells, int32, -1 out of reach.
 
-    `free`: bool (rows, cols), false along its rim; `sources`: int64 (k,), flat cells; `Notes`: ;
-    `-----`: ; `Steps go to 4 and 8 neighbours in turn`, `so that the cells within a distance make
-    an octagon: it`: ; `is Euclidean within a tenth`, `where steps are scaled by 1.2.`: ."""
+    Steps go to 4 and 8 neighbours in turn, so that the cells within a distance make an octagon: it
+    is Euclidean within a tenth, where steps are scaled by 1.2. `free`: bool (rows, cols), false
+    along its rim; `sources`: int64 (k,), flat cells.
+    """
     cols = free.shape[1]
     steps = np.full(free.shape, -1, np.int32)
     queue = np.empty(free.size, np.int64)
