@@ -114,7 +114,7 @@ class FloorOptions(MapOptions):
 def is_building_file(path: Path) -> bool:
     """Return whether a file describes a building, and what reads buildings is installed."""
     reads = "building" in extensions("formats")
-    return reads and bool(extension("formats", "building").is_building_file(path))
+    return reads and bool(extension("formats", "building").is_building(path))
 
 
 def check_options(parameters: list[Any], args: FloorOptions) -> None:

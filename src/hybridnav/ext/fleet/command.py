@@ -18,6 +18,7 @@ from hybridnav.cli.options import closing_lines, parsed_closing, profile_lines
 from hybridnav.cli.query import PlanOptions, check_alternatives, checked_at, one_of
 from hybridnav.cli.reading import check_model, read_settings
 from hybridnav.cli.rendering import in_metric, preset_line
+from hybridnav.ext.fleet.files.kind import is_building as is_building  # noqa: PLC0414 - for `cli`
 from hybridnav.guide.words import check_language
 from hybridnav.maps.names import place_of_name, read_point
 from hybridnav.planning.text import rounded_bound
@@ -25,13 +26,6 @@ from hybridnav.planning.text import rounded_bound
 if TYPE_CHECKING:
     from hybridnav.cli.build import BuildOptions
     from hybridnav.ext.fleet import BuildingAlternatives
-
-
-def is_building_file(path: Path) -> bool:
-    """Return whether a file describes a building; most maps do not need the modules for it."""
-    from hybridnav.ext.fleet.files.kind import is_building  # noqa: PLC0415 - on demand
-
-    return is_building(path)
 
 
 def load_floors(args: MapOptions, seconds: dict[str, float]) -> hn.ext.fleet.Building:
@@ -103,9 +97,11 @@ def _plan_figures(
 ) -> dict[str, Any]:
     figures = _tour_figures(legs, waypoints, args) if args.via else legs[0].to_dict()
     shut = [item.what for item in building.journal.items()] if building.journal else []
+    # A profile may have chosen another preset than that of the building.
+    chosen = [result.settings["preset"] for result in legs[0].results]
     return figures | {
         "building": str(args.map_file),
-        "preset": _preset_of(building, legs[0]),
+        "preset": str((chosen or [building.floors[0].planner.preset.name])[0]),
         "words": [line for leg in legs for line in leg.words(args.language)],
         "query": " via ".join(typed[:-1]) + f" to {typed[-1]}",
         "blocked": [printable(text) for text in [*args.shut, *shut]] or None,
@@ -161,7 +157,8 @@ def _tour_figures(
     figures = each[-1] | {name: sum(leg[name] for leg in each) if solved else None for name in sums}
     for name in ("floors", "rides", "results", "instructions"):
         figures[name] = [item for leg in each for item in leg[name]]
-    is_fixed = args.at == "point" or not any(_is_name(stop) for stop in waypoints[1:-1])
+    named = any(isinstance(stop, str) or isinstance(stop[1], str) for stop in waypoints[1:-1])
+    is_fixed = args.at == "point" or not named
     bound = sum(leg.lower_bound for leg in legs) if solved and is_fixed else None
     gap = None if bound is None else figures["cost"] / bound - 1 if bound else 0.0
     seconds: dict[str, float] = {}
@@ -170,17 +167,6 @@ def _tour_figures(
             seconds[stage] = seconds.get(stage, 0.0) + spent
     own = {"start": each[0]["start"], "legs": each, "seconds": seconds}
     return figures | own | {"lower_bound": bound, "gap": gap}
-
-
-def _is_name(stop: Any) -> bool:
-    return isinstance(stop, str) or isinstance(stop[1], str)
-
-
-def _preset_of(building: hn.ext.fleet.Building, plan: hn.ext.fleet.BuildingPlan) -> str:
-    """Return the name of the preset that a plan is by, which a profile may have chosen."""
-    for result in plan.results:
-        return str(result.settings["preset"])
-    return building.floors[0].planner.preset.name
 
 
 def _typed(end: str | tuple[float, ...]) -> str:
@@ -259,11 +245,7 @@ def _route_lines(figures: dict[str, Any]) -> list[str]:
         return [*lines, cost, f"bound      {note}"]
     bound, stated = rounded_bound(figures["lower_bound"], figures["cost"])
     stated = stated.replace("long", "dear")
-    return [
-        *lines,
-        cost,
-        f"bound      {bound} m, the route is {stated}",
-    ]
+    return [*lines, cost, f"bound      {bound} m, the route is {stated}"]
 
 
 def _endpoint(text: str, building: hn.ext.fleet.Building) -> Any:

@@ -85,6 +85,8 @@ def export(args: ExportOptions) -> None:
     if args.is_building:
         _export_over_floors(args)
         return
+    from hybridnav.graphs import cover  # noqa: PLC0415 - on demand
+
     kind = args.kind
     robot = targets.Bundle.checked(
         args.bundle,
@@ -123,7 +125,7 @@ def export(args: ExportOptions) -> None:
         aim = fleet or (robot and robot._replace(lifts=lifts))
         missing = list(_write_graph(topology, graph, aim, out, args.frame))
         graph, keepout = targets.opened(graph, robot)  # as the file holds it
-        missing += targets.left_out(topology, graph)
+        missing += cover.left_out(topology, graph)
     pairs = targets.LOSS_PAIRS if args.report is None and fleet is not None else args.report
     judged = None
     if pairs is not None:
@@ -172,6 +174,7 @@ def _export_over_floors(args: ExportOptions) -> None:
             "indoorgml"
         )
     from hybridnav.ext.fleet import align_floors  # noqa: PLC0415 - on demand
+    from hybridnav.graphs import cover  # noqa: PLC0415
 
     seconds: dict[str, float] = {}
     building = load_floors(args, seconds)
@@ -185,7 +188,7 @@ def _export_over_floors(args: ExportOptions) -> None:
 
     def judging(topology: hn.TopologicalMap) -> RouteGraph:
         built = hn.graphs.build_lane_graph(topology, spacing_m=args.spacing_m)
-        bare.extend(f"{topology.grid.name}: {each}" for each in targets.left_out(topology, built))
+        bare.extend(f"{topology.grid.name}: {each}" for each in cover.left_out(topology, built))
         judged = hn.graphs.judge_route_graph(built, pairs=targets.LOSS_PAIRS, topology=topology)
         reports.append(judged)
         return built
@@ -222,7 +225,7 @@ def _export_over_floors(args: ExportOptions) -> None:
 
 
 def _change_lines(changes: dict[str, dict[str, list[Any]]]) -> list[str]:
-    """Return the lines of a summary about changes, none where no graph was targets."""
+    """Return the lines of a summary about changes, none where no graph was kept."""
     lines = []
     for kind, ids in changes.items():
         for what, names in ids.items():

@@ -100,7 +100,7 @@ class Bundle(NamedTuple):
         """Return the options, None for no bundle. Refuse folders that hold other files, costs that
         are no masks, and options that do not go with a bundle, or without one.
 
-        Raises `InvalidValueError` or `UsageError` when one of them is bundle.
+        Raises `InvalidValueError` or `UsageError` when one of them is refused.
         """
         from hybridnav.graphs.bundle import check_bundle, checked_masks  # noqa: PLC0415
 
@@ -113,13 +113,6 @@ class Bundle(NamedTuple):
         checked_masks(bundle.costs)
         check_bundle(folder)
         return bundle
-
-
-def left_out(topology: hn.TopologicalMap, graph: RouteGraph) -> tuple[str, ...]:
-    """Return what has no node in a graph; see `cover.left_out`."""
-    from hybridnav.graphs import cover  # noqa: PLC0415 - on demand
-
-    return cover.left_out(topology, graph)
 
 
 def draw(graph: RouteGraph, keepout: BoolArray | None, plot: Path | None) -> None:

@@ -154,14 +154,16 @@ class BuildingNetwork:
     def route(self, start: Position, goal: Position) -> GraphRoute | str:
         """Return the route between two free positions, or why there is none."""
         first, last = self.floors.get(start[0]), self.floors.get(goal[0])
-        if first is not None and first is last and self._is_direct(first, start[1], goal[1]):
-            return self._found([(first, np.stack([start[1], goal[1]]))], [], 0)
+        direct = np.stack([start[1], goal[1]])
+        if first is not None and first is last and first.sight.clear(direct[:1], direct[1:])[0]:
+            return self._found([(first, direct)], [], 0)
         ends = []
         for what, floor, (_, at) in (("start", first, start), ("goal", last, goal)):
             seen = None if floor is None else attach.nearest_only(floor.network.in_sight(at[None]))
             if floor is None or seen is None or not seen[0][-1]:
                 return f"no node in sight of the {what}"
-            ends.append(_of_all(seen, floor))
+            offsets, near, away = seen  # with numbers among all nodes, and in metres
+            ends.append((offsets, near + floor.base, away * floor.grid.resolution_m))
         costs, (nodes,), expanded = attach.shortest_routes(self._graph, ends[0], ends[1])
         if not math.isfinite(costs[0]):
             return ""
@@ -175,9 +177,6 @@ class BuildingNetwork:
         lines[-1] = np.concatenate([lines[-1], goal[1][None]])
         driven = [(floor, line) for (floor, _), line in zip(legs, lines, strict=True)]
         return self._found(driven, rides, int(expanded[0]), self._fault(legs, rides))
-
-    def _is_direct(self, floor: PlacedFloor, start: FloatArray, goal: FloatArray) -> bool:
-        return bool(floor.sight.clear(start[None], goal[None])[0])
 
     def _legs(self, nodes: list[int]) -> tuple[list[tuple[PlacedFloor, list[int]]], list[Lane]]:
         legs = [(self._floor_of(nodes[0]), [nodes[0]])]
@@ -277,9 +276,3 @@ def _n_passed(floor: PlacedFloor, nodes: list[int], point: FloatArray) -> int:
     """Return how many nodes of a leg are left out at its start: one that was passed, or none."""
     here = np.array(nodes, dtype=np.int64) - floor.base
     return len(nodes) - len(floor.network.without_passed(point, here))
-
-
-def _of_all(seen: attach.Offsets, floor: PlacedFloor) -> attach.Offsets:
-    """Return nodes in sight of a point with their numbers among all nodes, and metres."""
-    offsets, nodes, away = seen
-    return offsets, nodes + floor.base, away * floor.grid.resolution_m

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -131,7 +131,9 @@ def map(  # noqa: A001 - the command's name
     if topic is not None and is_bag(log_file):
         grid = _last_map(log_file, topic, yaw_rad)
         if grid is not None:
-            _write_map(grid, out, as_json)
+            hn.write_ros_map(grid, out)
+            whole = json.dumps(_map_figures(grid, out)) if as_json else None
+            answer((whole or "\n".join(map_lines(grid, out))) + "\n")
             return
     if yaw_rad is not None:
         raise UsageError(
@@ -168,16 +170,6 @@ def _last_map(bag: Path, topic: str, yaw_rad: float | None) -> hn.OccupancyGrid 
     return hn.ext.live.load_bag_map(bag, topic=topic, yaw_rad=yaw_rad, robot_radius_m=0.0)
 
 
-def _write_map(grid: hn.OccupancyGrid, out: Path, as_json: bool) -> None:  # noqa: FBT001 - private
-    hn.write_ros_map(grid, out)
-    rows, cols = grid.shape
-    if as_json:
-        figures = {"map": str(out), "rows": rows, "cols": cols, "resolution_m": grid.resolution_m}
-        answer(json.dumps(figures | {"cells": grid.class_counts()}) + "\n")
-    else:
-        answer("\n".join(map_lines(grid, out)) + "\n")
-
-
 def map_lines(grid: hn.OccupancyGrid, name: str | Path) -> list[str]:
     """Return the lines on a map of this name or file: its cells, its extent, their classes."""
     rows, cols = grid.shape
@@ -203,14 +195,14 @@ def _add_all(log: ScanLog, mapper: Mapper) -> None:
         advance(log.size_bytes, log.size_bytes)
 
 
-def _figures(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
+def _map_figures(grid: hn.OccupancyGrid, out: Path) -> dict[str, Any]:
     rows, cols = grid.shape
-    figures = {
-        "map": str(out),
-        "rows": rows,
-        "cols": cols,
-        "resolution_m": grid.resolution_m,
-        "cells": grid.class_counts(),
+    size = {"rows": rows, "cols": cols, "resolution_m": grid.resolution_m}
+    return {"map": str(out)} | size | {"cells": grid.class_counts()}
+
+
+def _figures(grid: hn.OccupancyGrid, log: ScanLog, seconds: float, out: Path) -> str:
+    figures = _map_figures(grid, out) | {
         "scans": log.n_scans,
         "left_out": dict(log.skipped),
         "no_readings": log.n_no_readings,
