@@ -28,7 +28,13 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.pyramid.record import Patch
 from hybridnav.route.route import Corridor
 from hybridnav.search.directed import DirectedSides
-from hybridnav.search.grid_search import UNLIMITED, all_moves, limited, move_tables
+from hybridnav.search.grid_search import (
+    ALL_BUT_BACK,
+    UNLIMITED,
+    limited,
+    move_tables,
+    moves_by_turn,
+)
 from hybridnav.search.kernels import descent as _kernels
 from hybridnav.search.kernels import fields as _field_kernels
 from hybridnav.search.kernels.descent import LevelFields, MapCells, Marks
@@ -429,7 +435,7 @@ class Descent:
                     unique_rows(above[above[:, 0] != above[:, 1]]).rows
                     for above in (fields.parent[shut], fields.parent[legal])
                 )
-            ground = self._ground._replace(moves=moves, successors=all_moves())
+            ground = self._ground._replace(moves=moves, successors=moves_by_turn(ALL_BUT_BACK))
             kept = fields._replace(neighbour=neighbour), ground
         return keep_last(self._directed, one_way, kept, _KEPT)
 

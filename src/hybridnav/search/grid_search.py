@@ -61,7 +61,7 @@ class _Work:
     def __init__(self, n_cells: int, weights: _Weights | None = None) -> None:
         weighted = weights is not None
         self.records = np.zeros(n_cells, dtype=np.int64 if weighted else np.uint32)
-        n_buckets = _kernels.BUCKETS if weights is None else weights.n_buckets
+        n_buckets = _kernels.BUCKETS if weights is None else weights.given[3]
         self.waiting = np.empty(n_buckets * _ROOM, dtype=np.int32)
         self.generation = 0
         self._last = _kernels.WIDE_GENERATIONS if weighted else _kernels.GENERATIONS
@@ -89,8 +89,9 @@ class _Weights:
         of_enterable = units[enterable]
         least = int(of_enterable.min(initial=_MOST_UNITS))
         most = int(of_enterable.max(initial=least))
-        self.scales = 2 * least, _kernels.bucket_shift(least)
-        self.n_buckets = _kernels.n_buckets(least, most)
+        buckets = _kernels.bucket_shift(least), _kernels.n_buckets(least, most)
+        self.given = self.units, 2 * least, *buckets
+        """What the kernel takes."""
 
 
 class GridSearch:
@@ -190,7 +191,7 @@ class GridSearch:
             generation = work.next_generation()
             tables = move_tables(corner_cutting=self._corner_cutting)
             of_work = None, None, work.records, generation, work.waiting
-            cost, _ = KERNEL(self._moves, cols, ends, UNLIMITED, *tables, *of_work)
+            cost, _ = KERNEL(self._moves, cols, ends, UNLIMITED, None, *tables, *of_work)
             work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
         path: LongArray | None = None if cost < 0 else trace_cells(work.records, cols, *ends)
         low_bits = 32 - _kernels.GENERATIONS.bit_length()
@@ -216,28 +217,18 @@ class GridSearch:
     ) -> CellPath:
         """Find a path of the least cost between two flat cells; see `search`."""
         weights, works = self._directed if is_directed else (self._weights, self._works)
+        tables = (
+            move_tables(corner_cutting=self._corner_cutting)
+            if weights is None
+            else (moves_by_turn(ALL_BUT_BACK if is_directed else AHEAD), None)
+        )
+        given = limit, weights and weights.given, *tables, *corridor
         with works.lent() as work:
             cost = BUCKET_FULL
             while cost == BUCKET_FULL:
                 generation = work.next_generation()
-                of_work = *corridor, work.records, generation, work.waiting
-                if weights is None:
-                    tables = move_tables(corner_cutting=self._corner_cutting)
-                    cost, expanded = _kernels.astar(
-                        moves, self._cols, endpoints, limit, *tables, *of_work
-                    )
-                else:
-                    cost, expanded = _kernels.weighted_astar(
-                        moves,
-                        weights.units,
-                        self._cols,
-                        endpoints,
-                        limit,
-                        weights.scales,
-                        all_moves() if is_directed else moves_ahead(),
-                        *of_work,
-                        weights.n_buckets,
-                    )
+                of_work = work.records, generation, work.waiting
+                cost, expanded = KERNEL(moves, self._cols, endpoints, *given, *of_work)
                 if cost == BUCKET_FULL:
                     work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
             if cost < 0:
@@ -268,37 +259,25 @@ def limited(
         moves[touched] = masks
 
 
-@lru_cache
-def all_moves() -> NDArray[np.uint32]:
-    """Return successors as `move_tables`, with all legal moves but those back.
-
-    Where a move is legal in one direction only, the paths that a successor is left out for may be
-    illegal.
-    """
-    mask = np.arange(256, dtype=np.uint32)
-    successors = np.zeros((9, 256), dtype=np.uint32)
-    for d in range(9):
-        for turn in (0, 7, 1, 6, 2, 5, 3) if d < 8 else range(8):  # noqa: PLR2004 - 8 directions
-            k = (d + turn) & 7
-            _put_first(successors[d], mask >> k & 1 == 1, k)
-    successors.flags.writeable = False
-    return successors.ravel()
+AHEAD = (0, 7, 1, 6, 2)
+"""Turns by at most 90 degrees, in steps of 45, straight on first."""
+ALL_BUT_BACK = (*AHEAD, 5, 3)
+"""Where a move is legal in one direction only, the paths that a successor is left out for may be
+illegal."""
 
 
 @lru_cache
-def moves_ahead() -> NDArray[np.uint32]:
-    """Return the legal moves by direction of arrival that turn by at most 90 degrees.
+def moves_by_turn(turns: tuple[int, ...]) -> NDArray[np.uint32]:
+    """Return the legal moves that make one of some turns, by direction of arrival.
 
     Returns uint32 (9 * 256,), as the successors of `move_tables`.
     """
     mask = np.arange(256, dtype=np.uint32)
     successors = np.zeros((9, 256), dtype=np.uint32)
-    for d in range(8):
-        for turn in (0, 7, 1, 6, 2):
+    for d in range(9):
+        for turn in turns if d < 8 else range(8):  # noqa: PLR2004 - 8 directions
             k = (d + turn) & 7
             _put_first(successors[d], mask >> k & 1 == 1, k)
-    for k in range(8):
-        _put_first(successors[8], mask >> k & 1 == 1, k)
     successors.flags.writeable = False
     return successors.ravel()
 

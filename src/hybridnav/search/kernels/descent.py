@@ -357,7 +357,7 @@ def _walk(fields, marks, ground, window, ends, n_route, horizon):
                 target, to = goal, 0
             window += 1
             cost, effort = astar(
-                ground.moves, cols, (cell, target), ground.limit,
+                ground.moves, cols, (cell, target), ground.limit, None,
                 ground.successors, ground.successors, None, None, waits[0], window, waits[1],
             )  # fmt: skip
             expanded += effort
