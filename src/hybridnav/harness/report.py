@@ -1,6 +1,5 @@
 """The report of a run as one HTML text that opens without network: tables, charts, worst cases."""
 
-import base64
 import io
 import math
 import re
@@ -30,7 +29,7 @@ from hybridnav.harness.scenes import MapSpec, map_digest, read_map
 from hybridnav.harness.tables import Table
 from hybridnav.maps import MAX_CELLS, Frame, OccupancyGrid
 from hybridnav.viz import method_styles, plot_losses, plot_paths, plot_speed
-from hybridnav.viz.canvas import picture_bytes
+from hybridnav.viz.canvas import picture_bytes, png_uri
 
 _CASE_WIDTH_IN = 4.0
 _CASE_DPI = 144.0
@@ -118,7 +117,7 @@ def paths_uri(grid: OccupancyGrid, path: FloatArray, shortest: FloatArray | None
     drawn, small = io.BytesIO(picture_bytes(ax, ".png", dpi=_CASE_DPI)), io.BytesIO()
     with Image.open(drawn) as image:
         image.convert("RGB").quantize(_CASE_COLOURS).save(small, format="PNG", optimize=True)
-    return f"data:image/png;base64,{base64.b64encode(small.getvalue()).decode('ascii')}"
+    return png_uri(small.getvalue())
 
 
 def _svg_uri(chart: Axes) -> str:
@@ -206,8 +205,6 @@ def render_report(report: ReportData) -> str:
     `report`: what to show. Texts may hold any characters. Returns an HTML document, to be written
     as UTF-8.
     """
-    from hybridnav.harness.report import Charts  # noqa: PLC0415 - loads matplotlib
-
     every = [report.overall_losses, *(section.losses for section in report.maps)]
     charts = Charts(name for losses in every for known in losses.values() for name in known)
     return _template().render(report=report, charts=charts)
@@ -323,8 +320,6 @@ def cases_of(outcome: Outcome) -> list[tuple[CaseKey, WorstCase]]:
 
 
 def _case(outcome: Outcome, record: Record, text: str) -> WorstCase | None:
-    from hybridnav.harness.report import paths_uri  # noqa: PLC0415 - loads matplotlib
-
     about = outcome.preparation
     if "file" not in about:
         return None

@@ -17,6 +17,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.transforms import Affine2D, Bbox
 from PIL import Image
 
@@ -127,6 +128,17 @@ class Canvas:
         """Width of the map in points."""
         return float(self.view.size[0]) * self.sizes.points_per_metre
 
+    def add_line(self, points: FloatArray, **look: Any) -> Line2D:
+        """Draw one line, or marks, at points `(x, y)` in metres; `look` is that of a `Line2D`."""
+        line = Line2D(*points.T, **look)
+        self.ax.add_line(line)
+        return line
+
+    def add_dots(self, at: FloatArray, diameter: float, **look: Any) -> None:
+        """Draw dots at points `(x, y)` in metres, of a diameter in points of the page; `look` is
+        that of a scatter."""
+        self.ax.scatter(at[:, 0], at[:, 1], s=diameter**2, **look)
+
     def add_lines(self, lines: Iterable[FloatArray], **look: Any) -> None:
         """Draw lines of points `(x, y)` in metres; `look` is that of a `LineCollection`."""
         self.ax.add_collection(LineCollection(list(lines), **look), autolim=False)
@@ -164,6 +176,11 @@ def draw_cells(canvas: Canvas, grid: OccupancyGrid, field_of: AnyArray, colours:
     window, block = _window(canvas.view, grid)
     image = _image(grid.measured[window], grid.classes[window], field_of[window], colours, block)
     _draw_image(canvas, grid, image, gid="cells")
+
+
+def draw_classes(canvas: Canvas, grid: OccupancyGrid) -> None:
+    """Draw the cells inside a view by their classes."""
+    draw_cells(canvas, grid, grid.classes, style.class_rgb())
 
 
 def draw_shades(canvas: Canvas, grid: OccupancyGrid, shades: ByteArray, *, gid: str) -> None:
@@ -267,11 +284,19 @@ def save_figure(picture: Axes | Figure, path: PathLike, *, dpi: float = 200) -> 
     if suffix not in _METADATA:
         kinds = ", ".join(_METADATA)
         raise InvalidValueError(f"a picture's file name must end in {kinds}, got '{file}'")
-    data = picture_bytes(picture, suffix, dpi=dpi)
+    _write(file, picture_bytes(picture, suffix, dpi=dpi))
+
+
+def _write(file: Path, data: bytes) -> None:
     try:
         replace_file(file, data)
     except OSError as error:
         raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+
+
+def png_uri(data: bytes) -> str:
+    """Return the bytes of a PNG as an address that a page holds."""
+    return f"data:image/png;base64,{base64.b64encode(data).decode()}"
 
 
 def picture_bytes(picture: Axes | Figure, suffix: str, *, dpi: float) -> bytes:
@@ -314,16 +339,12 @@ def save_frames(figures: Iterable[Figure], milliseconds: list[int], file: Path) 
     Raises `InvalidValueError` when the file cannot be written.
     """
     images = list(map(_pixels, figures))
-    data = _page(images, milliseconds) if file.suffix.lower() == ".html" else None
-    if data is None:
-        stream, (first, *others) = io.BytesIO(), images
-        look: dict[str, Any] = {"append_images": others, "duration": milliseconds, "loop": 0}
-        first.save(stream, "GIF", save_all=True, optimize=True, **look)
-        data = stream.getvalue()
-    try:
-        replace_file(file, data)
-    except OSError as error:
-        raise InvalidValueError(f"cannot write '{file}': {error.strerror or error}") from None
+    if file.suffix.lower() == ".html":
+        return _write(file, _page(images, milliseconds))
+    stream, (first, *others) = io.BytesIO(), images
+    look: dict[str, Any] = {"append_images": others, "duration": milliseconds, "loop": 0}
+    first.save(stream, "GIF", save_all=True, optimize=True, **look)
+    return _write(file, stream.getvalue())
 
 
 def _page(images: list[Image.Image], milliseconds: list[int]) -> bytes:
@@ -333,7 +354,7 @@ def _page(images: list[Image.Image], milliseconds: list[int]) -> bytes:
     for image in images:
         stream = io.BytesIO()
         image.save(stream, "PNG", optimize=True)
-        frames.append(f"data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}")
+        frames.append(png_uri(stream.getvalue()))
     values = {"frames": frames, "milliseconds": milliseconds}
     return _PAGE.replace("VALUES", json.dumps(values)).encode()
 

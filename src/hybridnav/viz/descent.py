@@ -170,8 +170,7 @@ def _draw(
     draw_cells(canvas, grid, *_coloured(grid, kept, is_path=is_path))
     width, points = canvas.sizes.line, grid.frame.points_of(descent.cells)
     if is_path:
-        line = Line2D(*points.T, color=style.PATH, lw=1.8 * width, zorder=5, gid="path")
-        canvas.ax.add_line(line)
+        line = canvas.add_line(points, color=style.PATH, lw=1.8 * width, zorder=5, gid="path")
     else:
         _outline(canvas, grid, np.isin(kept.field_of, kept.route))
     for point, marker in zip(points[[0, -1]], "os", strict=True):
@@ -204,6 +203,6 @@ def _coloured(
     table[:n][kept.kept] = pale[kept.kept]
     route = kept.route
     table[route] = pale[route] if is_path else style.rgb(*style.PLACES)[index[route]]
-    table[n:] = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)  # by class
+    table[n:] = style.class_rgb()
     is_kept = np.append(kept.kept, False)[kept.field_of]
     return np.where(is_kept, kept.field_of, n + grid.classes.astype(np.int32)), table

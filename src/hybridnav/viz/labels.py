@@ -12,7 +12,6 @@ from typing import Any, Protocol
 
 import numpy as np
 from matplotlib import patheffects
-from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import ArrayLike
 from scipy import ndimage
@@ -29,7 +28,7 @@ _SHAPES = {"start": ("o", 6.5), "goal": ("D", 6.0)}
 _ANCHORS = np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, 1], [1, -1], [-1, -1]])
 _OUTSIDE, _OVERLAP = 1000.0, 100.0  # penalties; covering all of the path costs 10
 
-_MOST_ALONG = 10_000
+_MOST_ALONG = 100_000
 """Points along one line beside which labels are laid: a wrong path may be longer than any map."""
 
 
@@ -82,18 +81,8 @@ class LabelPlacer:
         text.
         """
         x, y = box.mean(axis=0).tolist()
-        text = Text(
-            x,
-            y,
-            words,
-            horizontalalignment="center",
-            verticalalignment="center",
-            parse_math=False,
-            path_effects=[_halo(halo)],
-            zorder=9,
-            **font,
-        )
-        text.set_gid(gid)
+        look: dict[str, Any] = {"ha": "center", "va": "center", "parse_math": False, "gid": gid}
+        text = Text(x, y, words, path_effects=[_halo(halo)], zorder=9, **look, **font)
         self.canvas.ax.add_artist(text)
         self.taken.append(box)
 
@@ -117,15 +106,15 @@ def draw_markers(
 
     A marker outside the view is drawn at its rim, with its coordinates.
     """
-    ax, view, sizes = canvas.ax, canvas.view, canvas.sizes
+    view, sizes = canvas.view, canvas.sizes
     labels = LabelPlacer(canvas) if labels is None else labels
     points = [np.clip(marker.point, view.low, view.high) for marker in markers]
     labels.keep_free(points, 4.5 * sizes.line)
     along = _along(lines, 0.3 * sizes.font / sizes.points_per_metre)
     for marker, point in zip(markers, points, strict=True):
         shape, diameter = _SHAPES[marker.name]
-        drawn = Line2D(
-            *point[:, None],
+        canvas.add_line(
+            point[None],
             linestyle="none",
             marker=shape,
             markersize=diameter * sizes.line,
@@ -135,9 +124,8 @@ def draw_markers(
             clip_on=False,
             path_effects=[_halo(4.0 * sizes.line)],
             zorder=8,
+            gid=marker.name,
         )
-        drawn.set_gid(marker.name)
-        ax.add_line(drawn)
         words = marker.name
         if (point != marker.point).any():
             words += " ({:g}, {:g})".format(*marker.point)
@@ -248,7 +236,7 @@ class RoomWriter:
         areas = np.bincount(self._rooms.label_of.ravel() + 1, minlength=len(names) + 1)[1:]
         order = sorted(range(len(names)), key=lambda n: (names[n] not in first, -areas[n], n))
         boxes = ndimage.find_objects(self._rooms.label_of + 1, len(names))
-        along = _points_along(lines, self._grid.resolution_m)
+        along = _along(lines, self._grid.resolution_m)
         self.unnamed = [
             label
             for label in order
@@ -261,7 +249,7 @@ class RoomWriter:
         """Write the number of each room whose name did not fit: in the room, in small type if
         necessary, or else beside it, with a line to the room."""
         boxes = ndimage.find_objects(self._rooms.label_of + 1, len(self._rooms.names))
-        along = _points_along([], self._grid.resolution_m)
+        along = _along([], self._grid.resolution_m)
         for label in self.unnamed:
             number, window = str(label + 1), boxes[label]
             assert window is not None  # noqa: S101 - it was looked at for its name
@@ -275,11 +263,8 @@ class RoomWriter:
         spots = self.labels.boxes_beside(point, half, _LEADS)
         hidden = [self.labels.n_hidden(at) + (not self.labels.is_in_view(at)) for at in spots]
         box = spots[int(np.argmin(hidden))]
-        line = Line2D(
-            *np.stack([point, box.mean(axis=0)], axis=1), color=style.INK, linewidth=0.4, zorder=8
-        )
-        line.set_gid(f"lead-{label}")
-        self.labels.canvas.ax.add_line(line)
+        lead, look = np.stack([point, box.mean(axis=0)]), {"color": style.INK, "linewidth": 0.4}
+        self.labels.canvas.add_line(lead, **look, zorder=8, gid=f"lead-{label}")
         font = {"fontsize": _LEAST_FONT, "color": style.INK}
         self.labels.write(number, box, f"number-{label}", halo=_HALO, **font)
 
@@ -323,16 +308,6 @@ class RoomWriter:
         cells = cells[((cells >= 0) & (cells < self._grid.shape)).all(axis=1)]
         labels = self._rooms.label_of[tuple(cells.T)]
         return bool(np.isin(labels, (label, NO_ROOM)).all())
-
-
-def _points_along(lines: Sequence[FloatArray], spacing_m: float) -> FloatArray:
-    """Return the points of lines, with more points between distant ones; float64 (n, 2)."""
-    parts = [np.empty((0, 2))]
-    for line in lines:
-        lengths_m = lengths_along(line)
-        at = np.linspace(0.0, lengths_m[-1], int(lengths_m[-1] / spacing_m) + 2)
-        parts.append(np.stack([np.interp(at, lengths_m, axis) for axis in line.T], axis=1))
-    return np.concatenate(parts)
 
 
 def _depths(inside: BoolArray, window: tuple[slice, ...], grid: OccupancyGrid) -> list[FloatArray]:

@@ -249,10 +249,9 @@ def _draw_dots(canvas: Canvas, at: FloatArray, survives: BoolArray, free: BoolAr
     for (label, (size, face)), mask in zip(_DOTS.items(), (survives, ~survives), strict=True):
         edges = [style.INK if is_free else style.UNEXPLORED_NODE for is_free in free[mask]]
         fill = edges if label == "surviving" else face
-        canvas.ax.scatter(
-            at[mask, 0],
-            at[mask, 1],
-            s=(size * canvas.sizes.line) ** 2,
+        canvas.add_dots(
+            at[mask],
+            size * canvas.sizes.line,
             c=fill,
             edgecolors=edges,
             linewidths=0.9 * canvas.sizes.line,

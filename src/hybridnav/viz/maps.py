@@ -27,7 +27,7 @@ from hybridnav.pyramid import Level
 from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import layout, style
-from hybridnav.viz.canvas import Canvas, draw_cells, draw_shades, known_view
+from hybridnav.viz.canvas import Canvas, draw_cells, draw_classes, draw_shades, known_view
 from hybridnav.viz.layout import Entry
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 from hybridnav.viz.style import Sizes
@@ -64,13 +64,9 @@ def plot_map(
     'Figure 1'
     """
     canvas = Canvas.opened(ax, width_in, known_view(grid))
-    # Occupied and blocked cells have their own colours: only two classes are looked up.
-    colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)
-    draw_cells(canvas, grid, grid.classes, colours)
+    draw_classes(canvas, grid)
     entries: list[Entry] = [(Patch(fc=style.FREE, ec=style.ARC, lw=0.5), "free")]
-    if (grid.classes == CellClass.UNEXPLORED).any():
-        entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
-    entries += ground_entries(grid)
+    entries += unexplored_entry(grid) + ground_entries(grid)
     rows, cols = grid.shape
     words = [grid.name, f"{cols} x {rows} cells of {grid.resolution_m:g} m"]
     layout.finish_with_axes(canvas, entries, words if title is None else [title])
@@ -185,6 +181,12 @@ def ground_entries(grid: OccupancyGrid) -> list[Entry]:
     if blocked:
         entries.append((Patch(fc=style.BLOCKED), ", or ".join(blocked)))
     return entries
+
+
+def unexplored_entry(grid: OccupancyGrid) -> list[Entry]:
+    """Return the legend entry for unexplored cells, none on a map without any."""
+    is_unexplored = (grid.classes == CellClass.UNEXPLORED).any()
+    return [(Patch(fc=style.UNEXPLORED), "unexplored")] if is_unexplored else []
 
 
 def swatch(colours: Sequence[str], strength: float = 1.0) -> tuple[Patch, ...]:
@@ -365,9 +367,7 @@ def plot_costs(  # noqa: PLR0913 - all but the first two have defaults
     levels = np.round(shades(np.linspace(0, 1, _LEVELS))[:, :3] * 255).astype(np.uint8)
     colours = np.concatenate([levels, style.rgb(style.UNEXPLORED, _CLOSED)])
     draw_cells(canvas, grid, drawn, colours)
-    entries = ground_entries(grid)
-    if (grid.classes == CellClass.UNEXPLORED).any():
-        entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
+    entries = ground_entries(grid) + unexplored_entry(grid)
     if len(layer.closed_flat):
         entries.append((Patch(fc=_CLOSED), "closed"))
     entries += _draw_paths(canvas, paths or {})

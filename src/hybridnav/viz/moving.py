@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 from hybridnav import check_proof
 from hybridnav.errors import InvalidValueError
@@ -131,7 +130,7 @@ def _spread(
 ) -> Iterator[Figure]:
     view, columns = known_view(grid), len(records)
     every = np.concatenate([record.f for record in records.values()])
-    colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED, _REACHED, _EXPANDED)
+    colours = style.class_rgb(_REACHED, _EXPANDED)
     # As many cells of all searches together in each frame.
     limits = np.quantile(every, np.linspace(0, 1, _FRAMES))
     for number in range(_FRAMES + 1):
@@ -146,9 +145,8 @@ def _spread(
             canvas = Canvas.opened(ax, width_in / columns, view)
             draw_cells(canvas, grid, *_opened(grid, record, limit, colours))
             if is_last and len(record.path):
-                way = grid.frame.points_of(record.path)
-                line = Line2D(*way.T, color=style.PATH, lw=1.8 * canvas.sizes.line, zorder=5)
-                canvas.ax.add_line(line)
+                way, width = grid.frame.points_of(record.path), 1.8 * canvas.sizes.line
+                canvas.add_line(way, color=style.PATH, lw=width, zorder=5)
             frame_axes(canvas)
             add_title(canvas, words)
         yield ax.figure.figure

@@ -208,7 +208,7 @@ def plot_dual(
 
 def draw_dual(canvas: Canvas, level: Level) -> None:
     """Draw dual edges and dual vertices."""
-    ax, sizes, frame = canvas.ax, canvas.sizes, level.grid.frame
+    sizes, frame = canvas.sizes, level.grid.frame
     drawn = Boundaries(level)
     look = {"capstyle": "round", "joinstyle": "round", "zorder": 3}
     edges = map(frame.points_of_grid, drawn.lines)
@@ -224,10 +224,9 @@ def draw_dual(canvas: Canvas, level: Level) -> None:
         at = frame.points_of_grid(drawn.positions[level.dual.kinds == kind])
         if kind == FaceKind.OUTSIDE:  # may lie outside the visible part of the map
             at = np.clip(at, canvas.view.low, canvas.view.high)
-        ax.scatter(
-            at[:, 0],
-            at[:, 1],
-            s=(size * sizes.line) ** 2,
+        canvas.add_dots(
+            at,
+            size * sizes.line,
             c=colour,
             marker=marker,
             edgecolors=style.FREE,

@@ -40,8 +40,7 @@ class Places:
     @cached_property
     def large(self) -> BoolArray:
         """Mask of the places that are no specks; of all places if all are specks."""
-        areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
-        return areas >= min(TINY_M2, areas.max(initial=0.0))
+        return are_large(self.level, TINY_M2)
 
     def colours(self, strong: BoolArray | None = None, *, unexplored: bool = True) -> ByteArray:
         """Return RGB per place and one row more, for cells without a place; `strong` are not pale,
@@ -84,6 +83,12 @@ class Places:
         return list(at + out * (to + across) + back * (to - across))
 
 
+def are_large(level: Level, least_m2: float) -> BoolArray:
+    """Return which places have some area in square metres, the largest ones in any case."""
+    areas = level.areas * np.float64(level.grid.resolution_m**2)
+    return areas >= min(least_m2, areas.max(initial=0.0))
+
+
 def draw_arcs(
     canvas: Canvas, places: Places, *, self_loops: bool = False, unexplored: bool = True
 ) -> None:
@@ -111,14 +116,13 @@ def draw_arcs(
 
 def draw_dots(canvas: Canvas, places: Places, *, unexplored: bool = True) -> None:
     """Draw the positions of the places that are no specks: free ones dark, unexplored ones grey."""
-    ax, diameter = canvas.ax, places.dot(canvas.sizes)
+    diameter = places.dot(canvas.sizes)
     for mask, colour, share, gid in (
         (~places.free, style.UNEXPLORED_DOT, 0.75, "unexplored-dots"),
         (places.free, style.INK, 1.0, "free-dots"),
     )[0 if unexplored else 1 :]:
-        x, y = places.positions[mask & places.large].T
-        size = (share * diameter) ** 2
-        ax.scatter(x, y, s=size, c=colour, linewidths=0, zorder=4, gid=gid)
+        at = places.positions[mask & places.large]
+        canvas.add_dots(at, share * diameter, c=colour, linewidths=0, zorder=4, gid=gid)
 
 
 # Colours for the vertices of a plane graph, so that neighbours differ.

@@ -10,24 +10,23 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from numpy.typing import ArrayLike
 
 from hybridnav._base.trig import lengths_along
 from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.closures.blocked import Closable
 from hybridnav.errors import InvalidValueError
-from hybridnav.maps import CellClass, OccupancyGrid
+from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.planning import COST_METRICS, PlanResult
 from hybridnav.route import Route
 from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, View, draw_cells, known_view
+from hybridnav.viz.canvas import Canvas, View, draw_cells, draw_classes, known_view
 from hybridnav.viz.labels import Marker, draw_markers
 from hybridnav.viz.layout import Entry, finish
-from hybridnav.viz.maps import arc_handle, draw_query, ground_entries, swatch
+from hybridnav.viz.maps import arc_handle, draw_query, ground_entries, swatch, unexplored_entry
 from hybridnav.viz.places import Places, draw_arcs, draw_dots
 from hybridnav.viz.style import Sizes
 
@@ -183,10 +182,9 @@ def _draw_route(
     look = {"colors": style.INK, "capstyle": "round", "zorder": 5}
     rim = (PATH_WIDTH + _CASING) * canvas.sizes.line if len(path) else 0.0
     canvas.add_lines(lines, linewidths=width + rim, **look, gid="route")
-    canvas.ax.scatter(
-        dots[:, 0],
-        dots[:, 1],
-        s=max(places.dot(canvas.sizes), 2.4 * width) ** 2,
+    canvas.add_dots(
+        dots,
+        max(places.dot(canvas.sizes), 2.4 * width),
         c=style.FREE,
         edgecolors=style.INK,
         linewidths=0.7 * width,
@@ -215,8 +213,8 @@ def draw_path(canvas: Canvas, points: FloatArray) -> None:
     casing = patheffects.withStroke(
         linewidth=(PATH_WIDTH + _CASING) * factor, foreground=style.FREE, capstyle="round"
     )
-    line = Line2D(
-        *points.T,
+    canvas.add_line(
+        points,
         color=style.PATH,
         linewidth=PATH_WIDTH * factor,
         solid_capstyle="round",
@@ -225,7 +223,6 @@ def draw_path(canvas: Canvas, points: FloatArray) -> None:
         zorder=7,
         gid="path",
     )
-    canvas.ax.add_line(line)
 
 
 def _words(topology: TopologicalMap, result: PlanResult, optimum_m: float | None) -> list[str]:
@@ -326,24 +323,21 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
     lines = [_checked(path), _checked([] if shortest is None else shortest)]
     points = np.concatenate(lines)
     canvas = Canvas.opened(ax, width_in, _view_round(grid, points))
-    # Occupied and blocked cells have colours of their own: only two classes are looked up.
-    colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)
-    draw_cells(canvas, grid, grid.classes, colours)
+    draw_classes(canvas, grid)
     entries: list[Entry] = []
     width = canvas.sizes.line
     if len(lines[0]):
         draw_path(canvas, lines[0])
         entries.append((Line2D([], [], color=style.PATH, lw=PATH_WIDTH * width), "path"))
     if len(lines[1]):
-        line = Line2D(
-            *lines[1].T,
+        line = canvas.add_line(
+            lines[1],
             color=style.PARALLEL,
             linewidth=_SHORTEST_WIDTH * width,
             linestyle=_SHORTEST_DASHES,
             zorder=7.5,
             gid="shortest",
         )
-        canvas.ax.add_line(line)
         entries.append((line, "shortest path"))
     parts, met = list(map(_checked, losing)), _checked([] if contacts is None else contacts)
     if parts:
@@ -357,10 +351,9 @@ def plot_paths(  # noqa: PLR0913 - all but two have defaults
     endpoints = next((line[[0, -1]] for line in lines if len(line)), np.empty((0, 2)))
     markers = [Marker(name, end) for name, end in zip(("start", "goal"), endpoints, strict=False)]
     draw_markers(canvas, markers, lines)
-    if (grid.classes == CellClass.UNEXPLORED).any():
-        entries.append((Patch(fc=style.UNEXPLORED), "unexplored"))
+    entries += unexplored_entry(grid) + ground_entries(grid)
     words = [grid.name if title is None else title]
-    return finish(canvas, entries + ground_entries(grid), words, framed=True)
+    return finish(canvas, entries, words, framed=True)
 
 
 def _checked(given: ArrayLike) -> FloatArray:

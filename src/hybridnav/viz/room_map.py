@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -222,38 +223,18 @@ def draw_doors(canvas: Canvas, doors: Sequence[Door], left_out: str = "") -> lis
     """
     entries: list[Entry] = []
     passed = [door for door in doors if door.passable]
-    for gid, marker, shown, text in (
-        (
-            "doors",
-            "o",
-            [door for door in passed if not door.is_opening],
-            f"doors ({left_out})" if left_out else "doors",
-        ),
-        ("openings", "s", [door for door in passed if door.is_opening], "openings"),
-        (
-            "narrow-doors",
-            "o",
-            [door for door in doors if not door.passable],
-            "doors too narrow for the robot",
-        ),
+    narrow = [door for door in doors if not door.passable]
+    of_doors = f"doors ({left_out})" if left_out else "doors"
+    width = canvas.sizes.line
+    look: dict[str, Any] = {"color": style.PATH, "ls": "none", "zorder": 8}
+    look |= {"ms": 2 * DOOR_POINTS * width, "mew": 0.8 * width}
+    for gid, shown, marker, face, text in (
+        ("doors", [door for door in passed if not door.is_opening], "o", style.PATH, of_doors),
+        ("openings", [door for door in passed if door.is_opening], "s", style.PATH, "openings"),
+        ("narrow-doors", narrow, "o", style.FREE, "doors too narrow for the robot"),
     ):
-        at = [door.position for door in shown]
-        dots, sample = (
-            Line2D(
-                [x for x, _ in points],
-                [y for _, y in points],
-                color=style.PATH,
-                marker=marker,
-                markerfacecolor=style.FREE if gid == "narrow-doors" else style.PATH,
-                markeredgewidth=0.8 * canvas.sizes.line,
-                markersize=2 * DOOR_POINTS * canvas.sizes.line,
-                linestyle="none",
-                zorder=8,
-            )
-            for points in (at, [])
-        )
-        dots.set_gid(gid)
-        if gid == "doors" or at:
-            canvas.ax.add_line(dots)
-            entries.append((sample, text))
+        if gid == "doors" or shown:
+            at = np.array([door.position for door in shown]).reshape(-1, 2)
+            canvas.add_line(at, **look, marker=marker, mfc=face, gid=gid)
+            entries.append((Line2D([], [], **look, marker=marker, mfc=face), text))
     return entries

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import itertools
 from collections.abc import Sequence
@@ -23,7 +22,7 @@ from hybridnav.rooms import Door, Rooms
 from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view, picture_bytes
+from hybridnav.viz.canvas import Canvas, draw_cells, known_view, picture_bytes, png_uri
 from hybridnav.viz.charts import HasLosses, plot_losses
 from hybridnav.viz.labels import LabelPlacer, Marker, RoomWriter, draw_markers
 from hybridnav.viz.layout import Entry, finish
@@ -93,20 +92,9 @@ def plot_tour(  # noqa: PLR0913 - all but two have defaults
     entries, _ = _draw_ground(canvas, topology, tour.legs, paths, 1.0)
     entries += draw_query(canvas, topology, costs, blocked)
     for points in paths:
-        line = Line2D(*points.T, color=style.PATH, linewidth=_TOUR_WIDTH, zorder=7)
-        line.set_gid("path")
-        canvas.ax.add_line(line)
-        waypoints = Line2D(
-            *points[[0, -1]].T,
-            color=style.PATH,
-            marker="o",
-            markerfacecolor=style.FREE,
-            linestyle="none",
-            markersize=_WAYPOINT_POINTS,
-            zorder=8,
-        )
-        waypoints.set_gid("waypoints")
-        canvas.ax.add_line(waypoints)
+        canvas.add_line(points, color=style.PATH, lw=_TOUR_WIDTH, zorder=7, gid="path")
+        dots = {"marker": "o", "ms": _WAYPOINT_POINTS, "mfc": style.FREE, "ls": "none"}
+        canvas.add_line(points[[0, -1]], color=style.PATH, **dots, zorder=8, gid="waypoints")
     if paths:
         entries.insert(0, (Line2D([], [], color=style.PATH, lw=_TOUR_WIDTH), "path"))
     return finish(canvas, entries, [topology.grid.name, text] if title is None else [title])
@@ -161,9 +149,7 @@ def plot_alternatives(  # noqa: PLR0913 - all but two have defaults
     entries: list[Entry] = []
     styles = itertools.product(_DASHES, style.ROUTES)
     for number, (one, (dashes, colour)) in enumerate(zip(alternatives, styles, strict=False)):
-        line = _route_line(canvas, one.path.points, number, colour, dashes)
-        line.set_gid(f"route-{number + 1}")
-        canvas.ax.add_line(line)
+        _draw_line(canvas, one.path.points, number, colour, dashes)
         sample = Line2D([], [], color=colour, linestyle=dashes or "-", lw=2.2 * canvas.sizes.line)
         by_costs = one.result.metric in COST_METRICS
         cost = f", cost {one.result.cost:.2f} m" if by_costs else ""
@@ -189,17 +175,17 @@ def _by(legs: Sequence[Leg]) -> str:
     return f", by {kinds} {', '.join(shown)}"
 
 
-def _route_line(
+def _draw_line(
     canvas: Canvas, points: FloatArray, number: int, colour: str, dashes: _Dashes | None
-) -> Line2D:
-    """Return the line of a route: each later one is wider and below those before it."""
+) -> None:
+    """Draw the line of a route: each later one is wider and below those before it."""
     steps = min(number, len(style.ROUTES) - 1)
     width = (_ROUTE_WIDTH + _WIDER * steps) * canvas.sizes.line
     casing = patheffects.withStroke(
         linewidth=width + _CASING * canvas.sizes.line, foreground=style.FREE
     )
-    return Line2D(
-        *points.T,
+    canvas.add_line(
+        points,
         color=colour,
         linestyle=dashes or "-",
         linewidth=width,
@@ -207,6 +193,7 @@ def _route_line(
         solid_joinstyle="round",
         path_effects=[casing] if dashes is None else [],
         zorder=7 - number / 20,
+        gid=f"route-{number + 1}",
     )
 
 
@@ -328,6 +315,5 @@ def in_html(shown: Any) -> str:
         png = picture_bytes(plot(shown), ".png", dpi=_DPI)
     except InvalidValueError:  # a copy, or nothing to draw
         return text
-    data = base64.b64encode(png).decode()
     alt = html.escape(str(shown).partition("\n")[0], quote=True)
-    return f'<img alt="{alt}" src="data:image/png;base64,{data}">{text}'
+    return f'<img alt="{alt}" src="{png_uri(png)}">{text}'

@@ -15,7 +15,7 @@ from hybridnav.planning import Path
 from hybridnav.refine.ompl import Search
 from hybridnav.search.mesh import ConvexMesh, build_mesh
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, draw_cells, known_view
+from hybridnav.viz.canvas import Canvas, draw_cells, draw_classes, known_view
 from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import ground_entries
 
@@ -66,8 +66,7 @@ def plot_mesh(
         )
     canvas = Canvas.opened(ax, width_in, known_view(grid))
     line = canvas.sizes.line
-    colours = style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED)
-    draw_cells(canvas, grid, grid.classes, colours)
+    draw_classes(canvas, grid)
     corners = grid.frame.points_of_grid(mesh.corners)
     rings = np.split(corners[mesh.begins], mesh.first[1:-1]) if mesh.n_polygons else []
     fill = PolyCollection(
@@ -76,9 +75,8 @@ def plot_mesh(
     canvas.ax.add_collection(fill, autolim=False)
     _draw_sides(canvas, grid, mesh)
     convex = mesh.is_convex
-    x, y = corners[convex].T
-    size = (1.5 * line) ** 2
-    canvas.ax.scatter(x, y, s=size, c=style.HOLE, linewidths=0, zorder=4, gid="corners")
+    look = {"c": style.HOLE, "linewidths": 0, "zorder": 4, "gid": "corners"}
+    canvas.add_dots(corners[convex], 1.5 * line, **look)
     dot = Line2D([], [], ls="", marker="o", ms=3.5 * line, mfc=style.HOLE, mec="none")
     entries: list[Entry] = [
         (Patch(fc=_POLYGON, alpha=_FULL), "convex polygon"),
@@ -161,8 +159,7 @@ def plot_search(  # noqa: PLR0913 - all but the first two have defaults
     counts = [f"{sizes[0]:,} states", f"{sizes[1]:,} motions"]
     line = canvas.sizes.line
     if path is not None:
-        drawn = Line2D(*path.points.T, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")
-        canvas.ax.add_line(drawn)
+        canvas.add_line(path.points, color=style.PATH, lw=1.8 * line, zorder=5, gid="path")
         entries.append((Line2D([], [], color=style.PATH, lw=1.8 * line), "path"))
     if corridor is not None:
         (colour,) = style.rgb(_CORRIDOR, strength=_STRENGTH) / 255
@@ -180,9 +177,8 @@ def _draw_states(canvas: Canvas, search: Search | None) -> list[Entry]:
         canvas.add_lines(lines, colors=_EDGE, linewidths=0.5 * line, zorder=3, gid="motions")
         entries.append((Line2D([], [], color=_EDGE, lw=1.2 * line), "motions of the trees"))
     if search is not None and len(search.states):
-        x, y = np.array(search.states, dtype=np.float64).reshape(-1, 2).T
-        size = (1.3 * line) ** 2
-        canvas.ax.scatter(x, y, s=size, c=_STATE, linewidths=0, zorder=4, gid="states")
+        at = np.array(search.states, dtype=np.float64).reshape(-1, 2)
+        canvas.add_dots(at, 1.3 * line, c=_STATE, linewidths=0, zorder=4, gid="states")
         dot = Line2D([], [], ls="", marker="o", ms=3 * line, mfc=_STATE, mec="none")
         entries.append((dot, "states drawn"))
     return entries
@@ -193,10 +189,5 @@ def _draw_ground(canvas: Canvas, grid: OccupancyGrid, corridor: BoolArray | None
     index = grid.classes.astype(np.int64)
     if corridor is not None:
         index[corridor] = 3
-    colours = np.concatenate(
-        [
-            style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED),
-            style.rgb(_CORRIDOR, strength=_STRENGTH),
-        ]
-    )
-    draw_cells(canvas, grid, index, colours)
+    tint = style.rgb(_CORRIDOR, strength=_STRENGTH)
+    draw_cells(canvas, grid, index, np.concatenate([style.class_rgb(), tint]))

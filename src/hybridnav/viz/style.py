@@ -50,6 +50,11 @@ def rgb(*colours: str, strength: float = 1.0) -> ByteArray:
     return np.round(255 - strength * (255 - levels)).astype(np.uint8)
 
 
+def class_rgb(*more: str) -> ByteArray:
+    """Return the colours of cells by `CellClass`, and then more, as `rgb` does."""
+    return rgb(BLOCKED, FREE, UNEXPLORED, *more)
+
+
 @dataclass(frozen=True)
 class Sizes:
     """Sizes in points that suit the width of a picture."""

@@ -22,6 +22,7 @@ from hybridnav.viz import style
 from hybridnav.viz.canvas import Canvas, draw_cells, known_view
 from hybridnav.viz.fields import Field, Loops, distance_to_rim, smoothed
 from hybridnav.viz.layout import Entry, finish
+from hybridnav.viz.places import are_large
 from hybridnav.viz.style import Sizes
 
 MAX_VERTICES = 20_000
@@ -31,7 +32,6 @@ LEAST_AREA_M2 = 0.1
 FAINT = 0.4
 """Share of its colour that the map keeps under a graph."""
 _DASHED: dict[str, Any] = {"linestyles": [style.SELF_LOOP_DASHES], "capstyle": "butt"}
-_CLASSES = (style.BLOCKED, style.FREE, style.UNEXPLORED)
 _CLEARANCE = 3.2  # points on a picture of full width
 _LEAST_CLEARANCE = 1.5  # cells: less would follow their steps
 
@@ -51,8 +51,7 @@ class Graph:
     @cached_property
     def seen(self) -> BoolArray:
         """Mask of the drawn vertices, always including the largest."""
-        areas = self.level.areas * np.float64(self.level.grid.resolution_m**2)
-        return areas >= min(self.least_area_m2, areas.max(initial=0.0))
+        return are_large(self.level, self.least_area_m2)
 
     @cached_property
     def plain(self) -> BoolArray:
@@ -146,7 +145,7 @@ def plot_topology(  # noqa: PLR0913 - all but the first have defaults
     """
     level = drawable(places)
     canvas = Canvas.opened(ax, width_in, known_view(level.grid))
-    draw_ground(canvas, level.grid, level.grid.classes, style.rgb(*_CLASSES))
+    draw_ground(canvas, level.grid, level.grid.classes, style.class_rgb())
     graph = Graph(level, least_area_m2)
     draw_graph(canvas, graph, simple=simple)
     words = _words(graph, simple=simple) if title is None else [title]
@@ -191,17 +190,9 @@ def draw_graph(canvas: Canvas, graph: Graph, *, simple: bool) -> None:
         (~free, style.UNEXPLORED_NODE, 4.2, "unexplored-dots"),
         (free, style.INK, 5.2, "free-dots"),
     ):
-        at = graph.positions[mask & graph.seen]
-        canvas.ax.scatter(
-            at[:, 0],
-            at[:, 1],
-            s=(size * sizes.line) ** 2,
-            c=colour,
-            edgecolors=style.FREE,
-            linewidths=0.5 * sizes.line,
-            zorder=4,
-            gid=gid,
-        )
+        at, rim = graph.positions[mask & graph.seen], 0.5 * sizes.line
+        dots = {"c": colour, "edgecolors": style.FREE, "linewidths": rim}
+        canvas.add_dots(at, size * sizes.line, **dots, zorder=4, gid=gid)
 
 
 def _words(graph: Graph, *, simple: bool) -> list[str]:
