@@ -1,7 +1,6 @@
 """Contraction of a graph of corners into a hierarchy, and paths in it, for kernels."""
 
 from hybridnav.search.kernels.contract import HEAD_SHIFT, contract, have_reverses, pack, renumbered
-from hybridnav.search.kernels.labels import grow_rows
 from hybridnav.search.kernels.unpack import NO_ARC, corners_between
 
 __all__ = [
@@ -9,7 +8,6 @@ __all__ = [
     "NO_ARC",
     "contract",
     "corners_between",
-    "grow_rows",
     "have_reverses",
     "pack",
     "renumbered",

@@ -62,7 +62,7 @@ def total(values):
 
 @njit(cache=True, nogil=True)
 def grow(array):
-    """Return a copy of an array with twice the room."""
-    larger = np.empty(2 * array.size, array.dtype)
-    larger[: array.size] = array
+    """Return a copy of an array with room for twice as many numbers, or rows."""
+    larger = np.empty((2 * len(array), *array.shape[1:]), array.dtype)
+    larger[: len(array)] = array
     return larger

@@ -133,7 +133,7 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
                 continue
             mark[to] = is_open
             if size == len(heap):
-                heap = np.concatenate((heap, heap))
+                heap = grow(heap)
             estimate = octile_cost(row + ROW_STEP[k] - goal_row, col + COL_STEP[k] - goal_col)
             push(heap, size, cost + weight * estimate, to)
             size += 1

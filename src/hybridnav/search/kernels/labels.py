@@ -36,7 +36,7 @@ def climb(hierarchy, seeds, work, nodes, costs, n):
         if at_cost[k] < records[corner, 0]:
             records[corner, 0], records[corner, 1] = at_cost[k], may_follow[k]
             if size == len(heap):
-                heap = grow_rows(heap)
+                heap = grow(heap)
             push(heap, size, at_cost[k], np.int64(corner))
             size += 1
     begin = n
@@ -60,7 +60,7 @@ def climb(hierarchy, seeds, work, nodes, costs, n):
             records[other, 0] = further
             records[other, 1] = follow[kinds[other], packed & 63]
             if size == len(heap):
-                heap = grow_rows(heap)
+                heap = grow(heap)
             push(heap, size, further, other)
             size += 1
 
@@ -68,14 +68,6 @@ def climb(hierarchy, seeds, work, nodes, costs, n):
     for k in range(begin, n):
         records[nodes[k], 0] = FAR
     return nodes, costs, n, heap
-
-
-@njit(cache=True, nogil=True)
-def grow_rows(rows):
-    """Return a copy of an array of rows with room for twice as many."""
-    larger = np.empty((2 * len(rows), rows.shape[1]), rows.dtype)
-    larger[: len(rows)] = rows
-    return larger
 
 
 @guarded
@@ -104,7 +96,7 @@ def costs_to_cells(grid, start, goals, left, best):
             if left == 0:
                 break
         if size + 8 > len(heap):
-            heap = grow_rows(heap)
+            heap = grow(heap)
         for k in range(8):
             if moves[cell] >> k & 1 == 0:
                 continue

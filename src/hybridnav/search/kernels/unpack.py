@@ -3,6 +3,7 @@
 import numpy as np
 
 from hybridnav._base.jit import njit
+from hybridnav._base.kernels.arrays import grow
 
 NO_ARC = -1
 """Arc of the corners that a search began with."""
@@ -26,12 +27,12 @@ def _unpack(arcs, entry, nodes, count):
         past = middles[max(arc, -1 - arc)] if middles.size else np.int64(NO_ARC)
         if past < 0:
             if count == nodes.size:
-                nodes = np.concatenate((nodes, nodes))
+                nodes = grow(nodes)
             nodes[count] = head
             count += 1
             continue
         if depth + 2 > stack.shape[0]:
-            stack = np.concatenate((stack, stack))
+            stack = grow(stack)
         middle = past >> 32
         back, on = first[middle] + (past >> 16 & 0xFFFF), first[middle] + (past & 0xFFFF)
         if arc < 0:
@@ -57,7 +58,7 @@ def corners_between(arcs, meeting, records):
     node = np.int64(meeting)
     while records[node, 2] != NO_ARC:
         if n_chain == chain.size:
-            chain = np.concatenate((chain, chain))
+            chain = grow(chain)
         chain[n_chain] = node
         n_chain += 1
         node = records[node, 2] >> 32

@@ -18,10 +18,13 @@ from hybridnav._base.progress import Progress, no_progress
 from hybridnav._base.threads import Pool, behind
 from hybridnav.search.mesh.build import MANY_CORNERS, add_landmarks, contract_corners, find_edges
 from hybridnav.search.mesh.kernels.intervals import DIRECTED
-from hybridnav.search.mesh.kernels.polyanya import DONE, EXPANDED, N_COUNTS, WORK_FULL
 from hybridnav.search.mesh.kernels.queries import answer, answer_climbing
 from hybridnav.search.mesh.kernels.state import (
+    DONE,
+    EXPANDED,
     GROWING,
+    N_COUNTS,
+    WORK_FULL,
     CornerWork,
     Heap,
     Hierarchy,

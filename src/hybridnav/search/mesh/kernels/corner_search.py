@@ -8,9 +8,8 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.exact import turn_of
-from hybridnav._base.trig import hypot
-from hybridnav.search.mesh.kernels.intervals import APART, SPLIT, polygons_of_endpoints
-from hybridnav.search.mesh.kernels.polyanya import (
+from hybridnav.search.mesh.kernels.polyanya import pop, push, put_corner
+from hybridnav.search.mesh.kernels.state import (
     BEGUN,
     DONE,
     EXPANDED,
@@ -22,49 +21,15 @@ from hybridnav.search.mesh.kernels.polyanya import (
     TOUCHED,
     UPPER,
     WORK_FULL,
-    pop,
-    push,
-    put_corner,
+    CornerBend,
 )
-from hybridnav.search.mesh.kernels.state import CornerBend, Target
-from hybridnav.search.mesh.kernels.views import distance, lobe_of, see_from_point
+from hybridnav.search.mesh.kernels.views import distance, lobe_of, look
 
 _SLACK = 1e-9
 """Rounding of distances in the graph, in cells."""
 _TIE = 1e-10
 """Difference of two lengths that counts as none, in cells: of equal paths, one is chosen by their
 directions."""
-
-
-@njit(cache=True, nogil=True)
-def look(mesh, cells, endpoints, work):
-    """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
-
-    `mesh`, `endpoints`: see `successors`; `cells`: see `polygons_of_endpoints`; `work`: a
-    `CornerWork` or `HierarchyWork`, whose bounds receive the length and lower bound of the answer:
-    infinite if the endpoints are not connected, their distance if they see each other. Returns
-    `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the goal
-    sees and then those that the start sees; the indices at which both lists end.
-    """
-    sx, sy, tx, ty = endpoints
-    starts, goals = work.starts, work.goals
-    how, n_starts, n_goals = polygons_of_endpoints(mesh, cells, endpoints, starts, goals)
-    if how == APART:
-        work.bounds[:] = np.inf
-        return DONE, 0, 0
-    if how == SPLIT:
-        nowhere = Target(0.0, 0.0, starts[:0])
-        n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, work.room, 0)
-        if n < 0:
-            return WORK_FULL, 0, 0
-        target = Target(tx, ty, goals[:n_goals])
-        n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, work.room, n)
-        if n_all < 0:
-            return WORK_FULL, 0, 0
-        if not is_seen:
-            return PAUSED, n, n_all
-    work.bounds[:] = hypot(tx - sx, ty - sy)
-    return DONE, 0, 0
 
 
 @guarded

@@ -14,6 +14,16 @@ MANY = 4
 
 
 @njit(cache=True, nogil=True)
+def _kind(a, b, c, d):
+    """Return the kind of a lattice point, as in `kinds_of`, by which of its cells are free: two of
+    the lower row, two of the upper one."""
+    n = int(a) + int(b) + int(c) + int(d)
+    if n == 3:
+        return 0 if not a else 1 if not b else 2 if not c else 3
+    return MANY if n == 1 or (n == 2 and a == d) else NO_CORNER
+
+
+@njit(cache=True, nogil=True)
 def kinds_of(free):
     """Return the kind of each lattice point, uint8 (rows + 1, cols + 1).
 
@@ -29,13 +39,7 @@ def kinds_of(free):
         for col in range(cols + 1):
             b = below and col < cols and free[row - 1, col]
             d = above and col < cols and free[row, col]
-            n = int(a) + int(b) + int(c) + int(d)
-            kind = NO_CORNER
-            if n == 3:
-                kind = 0 if not a else 1 if not b else 2 if not c else 3
-            elif n == 1 or (n == 2 and a == d):
-                kind = MANY
-            kinds[row, col] = kind
+            kinds[row, col] = _kind(a, b, c, d)
             a, c = b, d
     return kinds
 
@@ -147,7 +151,7 @@ def touched_polygons(corners, sides, place, cells):
             if not is_near_known:
                 near = _polygons_near(corners, sides, component, cells, polygon_at.shape[1])
                 is_near_known = True
-            inner = _polygon_with(corners, first, begins, near, row, col)
+            inner = _polygon_with((corners, first, begins), near, 2, 2 * row + 1, 2 * col + 1)
         if inner < 0:
             continue
         waiting[0], size = inner, 1
@@ -198,20 +202,24 @@ def _polygons_near(corners, sides, component, cells, n_cols):
 
 
 @njit(cache=True, nogil=True)
-def _polygon_with(corners, first, begins, near, row, col):
-    """Return the one of some polygons with the centre of a cell, -1 for none."""
-    for polygon in near:
+def _polygon_with(mesh, polygons, parts, row, col):
+    """Return the one of some polygons with a point, -1 for none; `row` and `col` count parts of a
+    cell, `parts` of them each."""
+    corners, first, begins = mesh
+    for polygon in polygons:
         low, high = first[polygon], first[polygon + 1]
         holds = True
         for slot in range(low, high):
-            a, b = begins[slot], begins[low if slot + 1 == high else slot + 1]
-            holds = holds and (
-                _cross(
-                    2 * corners[a, 0], 2 * corners[a, 1], 2 * corners[b, 0], 2 * corners[b, 1],
-                    2 * row + 1, 2 * col + 1,
-                )
-                >= 0
+            a = begins[slot]
+            b = begins[low if slot + 1 == high else slot + 1]
+            side = _cross(
+                parts * corners[a, 0], parts * corners[a, 1],
+                parts * corners[b, 0], parts * corners[b, 1],
+                row, col,
             )  # fmt: skip
+            holds = side >= 0
+            if not holds:
+                break
         if holds:
             return polygon
     return -1
@@ -252,10 +260,7 @@ def kind_at(free, row, col):
     b = row > 0 and col < cols and free[row - 1, col]
     c = row < rows and col > 0 and free[row, col - 1]
     d = row < rows and col < cols and free[row, col]
-    n = int(a) + int(b) + int(c) + int(d)
-    if n == 3:
-        return 0 if not a else 1 if not b else 2 if not c else 3
-    return MANY if n == 1 or (n == 2 and a == d) else NO_CORNER
+    return _kind(a, b, c, d)
 
 
 @guarded
@@ -346,23 +351,6 @@ def are_inside(corners, first, begins, touched, triples):
     """
     inside = np.zeros(len(triples), np.bool_)
     for k in range(len(triples)):
-        row, col = triples[k]
-        for polygon in touched:
-            low, high = first[polygon], first[polygon + 1]
-            holds = True
-            for slot in range(low, high):
-                a = begins[slot]
-                b = begins[low if slot + 1 == high else slot + 1]
-                holds = holds and (
-                    _cross(
-                        3 * corners[a, 0], 3 * corners[a, 1], 3 * corners[b, 0], 3 * corners[b, 1],
-                        row, col,
-                    )
-                    >= 0
-                )  # fmt: skip
-                if not holds:
-                    break
-            if holds:
-                inside[k] = True
-                break
+        mesh = corners, first, begins
+        inside[k] = _polygon_with(mesh, touched, 3, triples[k, 0], triples[k, 1]) >= 0
     return inside

@@ -11,8 +11,8 @@ from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import pop, push
 from hybridnav._base.moves import FAR
 from hybridnav.search.contraction import NO_ARC, corners_between
-from hybridnav.search.mesh.kernels.corner_search import look
-from hybridnav.search.mesh.kernels.polyanya import (
+from hybridnav.search.mesh.kernels.polyanya import path_through
+from hybridnav.search.mesh.kernels.state import (
     BEGUN,
     DONE,
     EXPANDED,
@@ -24,9 +24,8 @@ from hybridnav.search.mesh.kernels.polyanya import (
     TOUCHED,
     UPPER,
     WORK_FULL,
-    path_through,
 )
-from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, distance
+from hybridnav.search.mesh.kernels.views import UNITS, class_of, cost_of, distance, look
 
 
 @guarded

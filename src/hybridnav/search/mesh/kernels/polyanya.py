@@ -28,18 +28,22 @@ from hybridnav.search.mesh.kernels.intervals import (
     successors,
     turns,
 )
-
-DONE, PAUSED, WORK_FULL = 0, 1, 2
-"""Status of a run of the search: the answer is good enough; the limit of expansions is reached;
-there are more nodes than room."""
-
-# Whole numbers that a search keeps between runs: nodes written, entries of the heap, corners
-# touched, nodes expanded, the last node of the best path (-1 if the search did not find it); and
-# for a query: its stage, polygons of start and goal, blocks or corners marked.
-N, SIZE, TOUCHED, EXPANDED, LAST, BEGUN, STARTS, GOALS, MARKED = range(9)
-N_COUNTS = 9
-# Reals: the length of the best path known, a lower bound on every path.
-UPPER, LOWER = 0, 1
+from hybridnav.search.mesh.kernels.state import (
+    BEGUN,
+    DONE,
+    EXPANDED,
+    GOALS,
+    LAST,
+    LOWER,
+    MARKED,
+    PAUSED,
+    SIZE,
+    STARTS,
+    TOUCHED,
+    UPPER,
+    WORK_FULL,
+    N,
+)
 
 _OPENED, _SEEDED = 1, 2
 """Stages of a query: its blocks are opened; its first nodes are written."""

@@ -7,14 +7,12 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.kernels.places import fixed, fixed_rows, room, room_rows
 from hybridnav.search.mesh.kernels.corner_search import query_corners
 from hybridnav.search.mesh.kernels.hierarchy_search import query_hierarchy
-from hybridnav.search.mesh.kernels.polyanya import (
+from hybridnav.search.mesh.kernels.polyanya import query_intervals
+from hybridnav.search.mesh.kernels.state import (
     DONE,
     LOWER,
     UPPER,
     WORK_FULL,
-    query_intervals,
-)
-from hybridnav.search.mesh.kernels.state import (
     Corners,
     Ends,
     Hierarchy,

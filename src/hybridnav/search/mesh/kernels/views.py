@@ -15,8 +15,10 @@ import numpy as np
 
 from hybridnav._base.jit import guarded, njit, overload
 from hybridnav._base.kernels.exact import turn_of
+from hybridnav._base.trig import hypot
 from hybridnav.search.contraction import pack
-from hybridnav.search.mesh.kernels.state import Target, Targets, ViewRoom
+from hybridnav.search.mesh.kernels.intervals import APART, SPLIT, polygons_of_endpoints
+from hybridnav.search.mesh.kernels.state import DONE, PAUSED, WORK_FULL, Target, Targets, ViewRoom
 
 # Bits of a pending interval: a corner at which paths may bend limits it on the left, on the right.
 _LEFT, _RIGHT = 1, 2
@@ -352,6 +354,37 @@ def _spread(mesh, x, y, target, room, n, found):
                 break
             ux, uy, bends_u, right_u, left_u = wx, wy, bends_w, right_w, left_w
     return found, is_target_seen
+
+
+@njit(cache=True, nogil=True)
+def look(mesh, cells, endpoints, work):
+    """Find the corners that the endpoints of a query see, or the answer if that needs no corner.
+
+    `mesh`, `endpoints`: see `successors`; `cells`: see `polygons_of_endpoints`; `work`: a
+    `CornerWork` or `HierarchyWork`, whose bounds receive the length and lower bound of the answer:
+    infinite if the endpoints are not connected, their distance if they see each other. Returns
+    `DONE` with the answer, `WORK_FULL`, or `PAUSED`, when the room holds the corners that the goal
+    sees and then those that the start sees; the indices at which both lists end.
+    """
+    sx, sy, tx, ty = endpoints
+    starts, goals = work.starts, work.goals
+    how, n_starts, n_goals = polygons_of_endpoints(mesh, cells, endpoints, starts, goals)
+    if how == APART:
+        work.bounds[:] = np.inf
+        return DONE, 0, 0
+    if how == SPLIT:
+        nowhere = Target(0.0, 0.0, starts[:0])
+        n, _ = see_from_point(mesh, tx, ty, goals[:n_goals], nowhere, work.room, 0)
+        if n < 0:
+            return WORK_FULL, 0, 0
+        target = Target(tx, ty, goals[:n_goals])
+        n_all, is_seen = see_from_point(mesh, sx, sy, starts[:n_starts], target, work.room, n)
+        if n_all < 0:
+            return WORK_FULL, 0, 0
+        if not is_seen:
+            return PAUSED, n, n_all
+    work.bounds[:] = hypot(tx - sx, ty - sy)
+    return DONE, 0, 0
 
 
 UNITS = float(1 << 34)
