@@ -264,7 +264,7 @@ class HybridPlanner(Questions):
         blocked = directed(blocked, one_way)
         with self._query():
             now, own = self._now, self._privacy
-            closed = blocked if own is None else self._closing([start, goal], blocked)
+            closed = self._closing([start, goal], blocked)
             if smooth is not None:
                 now = now.finishing(smooth)
             query, leaves_m = now.read(start, goal, closed, at, keep), None

@@ -96,9 +96,7 @@ class Questions:
         2.546
         """
         with self._query():
-            now, closed = self._now, directed(blocked, one_way)
-            if self._privacy is not None:
-                closed = self._closing([start, goal], closed)
+            now, closed = self._now, self._closing([start, goal], directed(blocked, one_way))
             return _distance(now, now.read(start, goal, closed))
 
     def path_between(

@@ -21,16 +21,9 @@ from pydantic_core import PydanticCustomError
 from typing_extensions import Self
 
 from hybridnav.maps.cells import DEFAULT_ROBOT_RADIUS_M
-from hybridnav.refine.ompl.settings import OmplSettings
+from hybridnav.refine.ompl.settings import Float, Int, OmplSettings
 
 _OWN = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
-
-
-def no_boolean(value: Any) -> Any:
-    """Refuse a YAML `yes` or `on` where a number belongs; Python would call it 1."""
-    if isinstance(value, bool):
-        raise PydanticCustomError("number_type", "input should be a number")
-    return value
 
 
 def _class_name(refine: str) -> str:
@@ -41,9 +34,7 @@ def _class_name(refine: str) -> str:
     raise PydanticCustomError("refiner", why)
 
 
-_Float = Annotated[float, BeforeValidator(no_boolean)]
-_Int = Annotated[int, BeforeValidator(no_boolean)]
-_Limit = Annotated[_Float, Field(gt=0, allow_inf_nan=False)]
+_Limit = Annotated[Float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Section(BaseModel):
@@ -62,13 +53,13 @@ class PyramidSettings(Section):
     'throats'
     """
 
-    merge_distance_m: Annotated[_Float, Field(gt=0)] = 4.0
+    merge_distance_m: Annotated[Float, Field(gt=0)] = 4.0
     """U_d in metres, infinity (.inf) allowed."""
     linkage: Literal["throats", "survivor", "radius", "diameter"] = "throats"
     """What stays below U_d."""
-    seed: Annotated[_Int, Field(ge=0, lt=2**32)] = 0
+    seed: Annotated[Int, Field(ge=0, lt=2**32)] = 0
     """Breaks ties."""
-    robot_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = DEFAULT_ROBOT_RADIUS_M
+    robot_radius_m: Annotated[Float, Field(ge=0, allow_inf_nan=False)] = DEFAULT_ROBOT_RADIUS_M
     """Radius by which occupied cells are inflated, in metres."""
 
 
@@ -82,13 +73,13 @@ class ClearanceSettings(Section):
     3.0
     """
 
-    inflation_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 0.70
+    inflation_radius_m: Annotated[Float, Field(ge=0, allow_inf_nan=False)] = 0.70
     """Distance from obstacles up to which cells cost more, in metres."""
-    scaling: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] = 3.0
+    scaling: Annotated[Float, Field(ge=0, allow_inf_nan=False)] = 3.0
     """How quickly costs fall off, 1 / m: `cost_scaling_factor`."""
-    inscribed_radius_m: Annotated[_Float, Field(ge=0, allow_inf_nan=False)] | None = None
+    inscribed_radius_m: Annotated[Float, Field(ge=0, allow_inf_nan=False)] | None = None
     """Distance from which they fall off, in metres; null for the radius of the robot."""
-    multiplier: Annotated[_Float, Field(ge=0, le=991)] = 2.0
+    multiplier: Annotated[Float, Field(ge=0, le=991)] = 2.0
     """Factor above 1 of a cell at the inscribed radius."""
 
 
@@ -199,9 +190,9 @@ class ShortestSettings(PlannerSettings):
     """
 
     method: Literal["shortest"] = "shortest"
-    epsilon: Annotated[_Float, Field(ge=0, le=1)] | None = None
+    epsilon: Annotated[Float, Field(ge=0, le=1)] | None = None
     """The search ends once no path can be better by more than this part; null for the optimum."""
-    budget_s: Annotated[_Float, Field(ge=0)] | None = None
+    budget_s: Annotated[Float, Field(ge=0)] | None = None
     """Seconds after which a query returns the best path so far, with its proved bound; null for no
     limit. Until the planner is prepared, such queries shorten a path of cells by line of sight."""
 
@@ -230,7 +221,7 @@ class _ByCosts(PlannerSettings):
     smooth: Smooth = "none"
     """Whether a path of cells is moved to a cheaper one at any angle; `arcs`, which goes with
     costs, also rounds the bends."""
-    turning_radius_m: Annotated[_Float, Field(gt=0, allow_inf_nan=False)] = 0.3
+    turning_radius_m: Annotated[Float, Field(gt=0, allow_inf_nan=False)] = 0.3
     """With `smooth: arcs`, the least radius of an arc, metres; else the robot turns on the spot."""
     costs: CostSettings | None = None
     """Factors by which metres cost more, and the path is the cheapest; null for lengths."""
@@ -269,7 +260,7 @@ class CheapestSettings(_ByCosts):
     """
 
     method: Literal["cheapest"] = "cheapest"
-    keep_within: Annotated[_Float, Field(ge=0, le=1e3)] = 0.02
+    keep_within: Annotated[Float, Field(ge=0, le=1e3)] = 0.02
     """Most that a kept path may cost more than a new one, a share; see `HybridPlanner.plan`."""
 
 
@@ -311,13 +302,13 @@ class PaperSettings(_Refined):
     levels: Literal["descent", "places"] = "descent"
     """Whether a route comes down from the places through the levels of the pyramid to small fields,
     or its places are the corridor at once."""
-    field_cells: Annotated[_Int, Field(ge=1)] = 128
+    field_cells: Annotated[Int, Field(ge=1)] = 128
     """Mean size of the fields at which a descent ends, in cells."""
-    step: Annotated[_Float, Field(ge=1, allow_inf_nan=False)] = 8.0
+    step: Annotated[Float, Field(ge=1, allow_inf_nan=False)] = 8.0
     """How many times smaller the fields of each level of a descent are than those before."""
-    ring: Annotated[_Int, Field(ge=0, le=100)] = 1
+    ring: Annotated[Int, Field(ge=0, le=100)] = 1
     """Rings of fields that a descent keeps beside its route; at the top two more."""
-    horizon_cells: Annotated[_Int, Field(ge=0)] = 128
+    horizon_cells: Annotated[Int, Field(ge=0)] = 128
     """Cells that grid A* looks ahead along the last fields; 0 for one search inside them."""
     corridor: Literal["route", "joined", "neighbours"] = "joined"
     """With `levels: places`, the fields in which the refiner searches: see

@@ -19,6 +19,7 @@ from hybridnav.errors import InvalidValueError
 from hybridnav.maps import OccupancyGrid
 from hybridnav.maps.costs import CostLayer
 from hybridnav.planning import COST_METRICS, PlanResult
+from hybridnav.planning.endpoints import read_point
 from hybridnav.route import Route
 from hybridnav.search.found import ClosedCells
 from hybridnav.topology import TopologicalMap
@@ -133,22 +134,10 @@ def _markers(result: PlanResult, start: ArrayLike | None, goal: ArrayLike | None
     endpoints = result.path.points[[0, -1]] if result.path is not None else (None, None)
     markers = []
     for name, given, end in zip(("start", "goal"), (start, goal), endpoints, strict=True):
-        point = end if given is None else _checked_point(name, given)
+        point = end if given is None else read_point(name, given)
         if point is not None:
             markers.append(Marker(name, point))
     return markers
-
-
-def _checked_point(name: str, given: ArrayLike) -> FloatArray:
-    try:
-        point = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError):
-        point = np.empty(0)
-    if point.shape != (2,) or not np.isfinite(point).all():
-        raise InvalidValueError(
-            f"{name} must be two finite coordinates (x, y) in metres, got {given!r:.80}"
-        )
-    return point
 
 
 def _corridor(topology: TopologicalMap, result: PlanResult) -> BoolArray:

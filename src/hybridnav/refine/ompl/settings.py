@@ -131,9 +131,11 @@ def _corners(value: Any) -> Any:
     return value
 
 
-_Float = Annotated[float, BeforeValidator(_no_boolean)]
-_Int = Annotated[int, BeforeValidator(_no_boolean)]
-_Coordinate = Annotated[_Float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
+Float = Annotated[float, BeforeValidator(_no_boolean)]
+"""A number, also of the other sections of a preset."""
+Int = Annotated[int, BeforeValidator(_no_boolean)]
+"""A whole number."""
+_Coordinate = Annotated[Float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
 
 
 class OmplSettings(BaseModel):
@@ -162,19 +164,19 @@ class OmplSettings(BaseModel):
     ] = Field(default=None, min_length=3, max_length=1000)
     """Corners in metres in the robot's frame, x ahead: a list, Nav2's string of it, or a shapely
     polygon or its WKT. Null for the disc that the map was inflated for."""
-    footprint_padding_m: Annotated[_Float, Field(ge=0, le=1e3)] = 0.0
+    footprint_padding_m: Annotated[Float, Field(ge=0, le=1e3)] = 0.0
     """Metres by which each side of the footprint is moved outwards, as Nav2's `footprint_padding`:
     no point of the robot comes nearer to an obstacle."""
-    turning_radius_m: Annotated[_Float, Field(gt=0, le=1e4)] | None = None
+    turning_radius_m: Annotated[Float, Field(gt=0, le=1e4)] | None = None
     """Turning radius of `dubins` and `reeds-shepp`."""
     reverses: bool = False
     """With `differential`: whether the robot may also drive backwards if it cannot drive ahead."""
-    budget_s: Annotated[_Float, Field(ge=0.01, le=3600)] = 1.0
+    budget_s: Annotated[Float, Field(ge=0.01, le=3600)] = 1.0
     """Seconds that a query may take; kept to within 10 %."""
-    iterations: Annotated[_Int, Field(ge=1, le=1_000_000_000)] | None = None
+    iterations: Annotated[Int, Field(ge=1, le=1_000_000_000)] | None = None
     """Iterations of planners and of simplification that a query may take, instead of the seconds,
     which stay as a limit. Results before that limit repeat for equal seeds."""
-    seed: Annotated[_Int, Field(ge=1, lt=2**31)] = 1
+    seed: Annotated[Int, Field(ge=1, lt=2**31)] = 1
     """Seed of OMPL's random numbers."""
     confine: Confinement = "chain"
     """Confinement to the corridor. `chain`: a chain of small problems, field by field. `mask`: one

@@ -23,7 +23,6 @@ from hybridnav.refine.ompl import OmplSettings
 from hybridnav.refine.ompl.client import Search
 from hybridnav.refine.ompl.settings import PARAMETERS, REAL, ROADMAPS
 
-_STATES = {"r2": 2, "se2": 3, "differential": 3, "dubins": 3, "reeds-shepp": 3}
 FINE = 1e-4
 """Share of the extent that OMPL takes as its validity resolution; its own motion check is never
 used, so the share only has to be small."""
@@ -55,16 +54,15 @@ class StateSpace:
             bounds.setHigh(axis, float(max(high[axis], low[axis] + 1e-9)))
         self._check = check
         self._radius_m, self._is_dubins = settings.turning_radius_m, settings.space == "dubins"
-        self.spins = settings.space in {"se2", "differential"}
+        self.spins = settings.follows_discs
         self.is_roadmap = settings.planner in ROADMAPS
         self._spells = settings.space == "differential"
         self._reverses = settings.reverses
-        self.dimension = _STATES[settings.space]
+        self.dimension = 3 if settings.has_heading else 2
         self.space = _space_of(settings)
         self.space.setBounds(bounds)
         self.information = base.SpaceInformation(self.space)
-        is_flat = self.dimension == 2  # noqa: PLR2004
-        self.state_valid = _flat_check(check, note) if is_flat else _heading_check(check, note)
+        self.state_valid = _check_of(check, note, is_flat=not settings.has_heading)
         self._motions = _motions_of(settings, check, self.information)
         self.information.setStateValidityChecker(self.state_valid)
         self.information.setMotionValidator(self._motions)
@@ -134,39 +132,28 @@ class StateSpace:
 def _space_of(settings: OmplSettings) -> Any:
     if settings.space == "r2":
         return base.RealVectorStateSpace(2)
-    if settings.space in {"se2", "differential"}:
+    if settings.follows_discs:
         return base.SE2StateSpace()
     if settings.space == "dubins":
         return base.DubinsStateSpace(settings.turning_radius_m)
     return base.ReedsSheppStateSpace(settings.turning_radius_m)
 
 
-def _flat_check(check: MotionCheck, note: Callable[[float, float], None] | None) -> Any:
+def _check_of(
+    check: MotionCheck, note: Callable[[float, float], None] | None, *, is_flat: bool
+) -> Any:
     valid = check.state_valid
-    if note is None:
-        return lambda state: valid(state[0], state[1])
 
-    def noted(state: Any) -> bool:
-        good = valid(state[0], state[1])
-        if good:
-            note(state[0], state[1])
+    def noted(*values: float) -> bool:
+        good = valid(*values)
+        if good and note is not None:
+            note(*values[:2])
         return good
 
-    return noted
-
-
-def _heading_check(check: MotionCheck, note: Callable[[float, float], None] | None) -> Any:
-    valid = check.state_valid
-    if note is None:
-        return lambda state: valid(state.getX(), state.getY(), state.getYaw())
-
-    def noted(state: Any) -> bool:
-        good = valid(state.getX(), state.getY(), state.getYaw())
-        if good:
-            note(state.getX(), state.getY())
-        return good
-
-    return noted
+    told = valid if note is None else noted
+    if is_flat:
+        return lambda state: told(state[0], state[1])
+    return lambda state: told(state.getX(), state.getY(), state.getYaw())
 
 
 class _Straight(base.MotionValidator):  # type: ignore[misc]  # the bindings have no types
