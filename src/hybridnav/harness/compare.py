@@ -1,6 +1,7 @@
 """Two runs side by side: what changed for each method on each map, and whether by chance."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,15 @@ from hybridnav.harness.records import query_key
 from hybridnav.harness.tables import Row
 from hybridnav.harness.yardstick import OPTIMA, Optimum, Yardstick
 
-_Sample = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+
+class _Sample(NamedTuple):
+    """Pairs that two methods were asked, on one map or all."""
+
+    losses: FloatArray
+    others: FloatArray
+    """Losses of the second method."""
+    seconds: FloatArray
+    other_seconds: FloatArray
 
 
 def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both") -> list[Row]:
@@ -59,18 +68,15 @@ def compare_runs(first: PathLike, second: PathLike, *, metric: Yardstick = "both
             for other in studies[1].of_method(labels[1]):
                 if one.preparation["map_sha"] == other.preparation["map_sha"]:
                     sample = _paired(one, other)
-                    if len(sample[0]):
+                    if len(sample.losses):
                         over = _optimum(one, other)
                         rows.append(_row(labels, one.map_name, over, sample))
                         samples.append((over, sample))
         overs = {over for over, _ in samples}
         if len(samples) > 1 and len(overs) == 1:
-            pooled = [
-                np.concatenate(part) for part in zip(*(one for _, one in samples), strict=True)
-            ]
-            rows.append(
-                _row(labels, "all maps", overs.pop(), (pooled[0], pooled[1], pooled[2], pooled[3]))
-            )
+            parts = zip(*(one for _, one in samples), strict=True)
+            pooled = _Sample(*map(np.concatenate, parts))
+            rows.append(_row(labels, "all maps", overs.pop(), pooled))
     if not rows:
         raise InvalidValueError(f"runs {first} and {second} share no method, map and pair")
     return rows
@@ -92,7 +98,7 @@ def _methods(first: Study, second: Study) -> list[tuple[str, str]]:
 
 
 def _paired(first: Outcome, second: Outcome) -> _Sample:
-    """Return losses and seconds of the common pairs: first, second, first, second."""
+    """Return losses and seconds of the common pairs."""
     places = [
         {query_key(record): at for at, record in enumerate(outcome.references)}
         for outcome in (first, second)
@@ -101,7 +107,7 @@ def _paired(first: Outcome, second: Outcome) -> _Sample:
     one, other = (np.array([place[key] for key in shared], dtype=np.int64) for place in places)
     best = np.minimum(first.best_m[one], second.best_m[other])
     losses = loss_of(first.judged_m[one], best), loss_of(second.judged_m[other], best)
-    return *losses, first.seconds[one], second.seconds[other]
+    return _Sample(*losses, first.seconds[one], second.seconds[other])
 
 
 def _optimum(first: Outcome, second: Outcome) -> Optimum:

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, overload
+from typing import Any, TypeVar
 
 from hybridnav._base.files import MODEL_SUFFIX, printable
 from hybridnav._base.progress import Progress, no_progress
@@ -51,6 +51,7 @@ from hybridnav.planning import Preset
 MOVINGAI_MERGE_DISTANCE_M = 40.0
 """Default on MovingAI maps, whose cells are 1 m by agreement; the robot is a point there."""
 
+_AnyTask = TypeVar("_AnyTask", Task, TimingTask)
 _PAIRS = 100
 _PAIRS_PER_TASK = 2000
 
@@ -184,7 +185,7 @@ def write_records(
             total = len({name for task in tasks for name in task.ids})
             wanted = [rest for task in tasks if (rest := _missing(task, records.ids)) is not None]
             before = len(records.ids)
-            done = total - sum(len(_new_ids(task, records.ids)) for task in wanted)
+            done = total - sum(len({*task.ids} - records.ids) for task in wanted)
             for some in (
                 [task for task in wanted if task.method.source],
                 [task for task in wanted if not task.method.source],
@@ -271,11 +272,7 @@ def _timing_tasks(
     return passes
 
 
-@overload
-def _missing(task: Task, there: set[str]) -> Task | None: ...
-@overload
-def _missing(task: TimingTask, there: set[str]) -> TimingTask | None: ...
-def _missing(task: Task | TimingTask, there: set[str]) -> Task | TimingTask | None:
+def _missing(task: _AnyTask, there: set[str]) -> _AnyTask | None:
     """Return the part of a task without records, None if there is no such part."""
     pairs = tuple(
         pair for pair, name in zip(task.pairs, task.ids[1:], strict=True) if name not in there
@@ -283,10 +280,6 @@ def _missing(task: Task | TimingTask, there: set[str]) -> Task | TimingTask | No
     if not pairs and task.ids[0] in there:
         return None
     return replace(task, pairs=pairs)
-
-
-def _new_ids(task: Task, there: set[str]) -> set[str]:
-    return {name for name in task.ids if name not in there}
 
 
 def _scenario_files(settings: RunSettings) -> tuple[str, ...]:

@@ -150,6 +150,11 @@ class Pair:
         (row, col), (goal_row, goal_col) = self.start, self.goal
         return f"{self.kind}:{row},{col}>{goal_row},{goal_col}"
 
+    @property
+    def fields(self) -> dict[str, Any]:
+        """What each record of the pair holds."""
+        return {"kind": self.kind, "start": list(self.start), "goal": list(self.goal)}
+
 
 def components(grid: OccupancyGrid) -> tuple[IntArray, LongArray]:
     """Return the 4-connected components of free cells: an int32 label for each cell, 0 for none,

@@ -78,14 +78,10 @@ class Task:
             "status": status,
             "faults": [],
         }
-        if not index:
-            common |= _of_method(self.method)
-        if self.map.costs and not index:
-            common["costs"] = text_of_costs(self.map.costs)
         if index:
-            pair = self.pairs[index - 1]
-            common |= {"kind": pair.kind, "start": list(pair.start), "goal": list(pair.goal)}
-        return common
+            return common | self.pairs[index - 1].fields
+        costs = {"costs": text_of_costs(self.map.costs)} if self.map.costs else {}
+        return common | _of_method(self.method) | costs
 
 
 def run_task(task: Task) -> Iterator[Record]:
@@ -254,14 +250,7 @@ _FRAMES, _TRACEBACK = 8, 4000
 
 
 def _of_pair(name: str, pair: Pair, common: Record) -> Record:
-    record = {
-        "id": name,
-        "type": "pair",
-        **common,
-        "kind": pair.kind,
-        "start": list(pair.start),
-        "goal": list(pair.goal),
-    }
+    record = {"id": name, "type": "pair", **common, **pair.fields}
     if pair.seed is not None:
         record |= {"seed": pair.seed, "sampler_version": SAMPLER_VERSION}
     if pair.stated_optimum_cells is not None:

@@ -129,13 +129,9 @@ class TimingTask:
             "method_sha": self.digest,
             "repeat": self.repeat,
             **({} if index else {"methods": sorted(spec.digest for spec in self.methods)}),
-            **(_of_pair(self.pairs[index - 1]) if index else {}),
+            **(self.pairs[index - 1].fields if index else {}),
             "faults": [],
         }
-
-
-def _of_pair(pair: Pair) -> Record:
-    return {"kind": pair.kind, "start": list(pair.start), "goal": list(pair.goal)}
 
 
 def circumstances() -> Record:
