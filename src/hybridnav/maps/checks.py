@@ -115,9 +115,17 @@ def checked_points(points: ArrayLike) -> FloatArray:
 
     Raises `InvalidValueError` when they are no finite array of shape (n, 2) or there is none.
     """
-    xy = np.asarray(points, dtype=np.float64)
+    try:
+        xy = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InvalidValueError(
+            f"points are {points!r:.60}, expected finite numbers (x, y) of shape (n, 2): give each "
+            "point two"
+        ) from None
     if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy):  # noqa: PLR2004
-        raise InvalidValueError(f"points must have the shape (n, 2), n >= 1, got {xy.shape}")
+        raise InvalidValueError(
+            f"points must be finite numbers (x, y) of shape (n, 2), n >= 1, got shape {xy.shape}"
+        )
     if not np.isfinite(xy).all():
         raise InvalidValueError("points need finite coordinates in metres")
     return xy

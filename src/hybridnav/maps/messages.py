@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridnav._base.typing import ByteArray, SignArray
+from hybridnav._base.typing import ByteArray, LongArray, SignArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps.cells import MAX_CELLS, CellClass
 from hybridnav.maps.frame import Frame
@@ -91,20 +91,25 @@ def percentages(
     (rows, cols), their class by the thresholds; `thresholds`: U1 and U2.
     """
     occupancy = (np.arange(_FULL + 1) / _FULL).astype(np.float32)
-    low, high = (np.float32(threshold) for threshold in thresholds)
     percent = np.rint(probability.astype(np.float64) * _FULL)
     values = np.full(probability.shape, _UNKNOWN, dtype=np.int8)
-    allowed_by = {
-        CellClass.FREE: occupancy <= low,
-        CellClass.OCCUPIED: (occupancy >= high) & (occupancy > low),
-        CellClass.UNEXPLORED: (occupancy > low) & (occupancy < high),
-    }
-    for kind, is_allowed in allowed_by.items():
-        allowed = np.flatnonzero(is_allowed)
+    for kind, allowed in levels_by_class(occupancy, thresholds).items():
         cells = (measured == kind) & ~np.isnan(percent)
         if allowed.size:  # none between two thresholds of less than a percent: unknown
             values[cells] = np.clip(percent[cells], allowed[0], allowed[-1]).astype(np.int8)
     return values
+
+
+def levels_by_class(
+    occupancy: NDArray[np.float32], thresholds: tuple[float, float]
+) -> dict[CellClass, LongArray]:
+    """Return the indices of the occupancies, float32 (n,), that U1 and U2 take for each class."""
+    low, high = (np.float32(threshold) for threshold in thresholds)
+    return {
+        CellClass.FREE: np.flatnonzero(occupancy <= low),
+        CellClass.OCCUPIED: np.flatnonzero((occupancy >= high) & (occupancy > low)),
+        CellClass.UNEXPLORED: np.flatnonzero((occupancy > low) & (occupancy < high)),
+    }
 
 
 def _as_sent(resolution: float) -> float:

@@ -202,16 +202,6 @@ class SpeedLimits:
     full_speed_mps: float | None
 
     @property
-    def source(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return {
-            "base": self.base,
-            "multiplier": self.multiplier,
-            "unit": self.unit,
-            "full_speed_mps": self.full_speed_mps,
-        }
-
-    @property
     def _of_values(self) -> FloatArray:
         """The limit for each value, float64 (102,), the last one for unknown."""
         return self.base + self.multiplier * np.arange(_VALUES + 1, dtype=np.float64)

@@ -9,6 +9,7 @@ from hybridnav._base.kernels.exact import GRAIN
 from hybridnav._base.typing import FloatArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import Frame, OccupancyGrid
+from hybridnav.maps.checks import checked_points
 from hybridnav.maps.costs.kernels import legal_cost, line_cost, segment_cost
 from hybridnav.maps.costs.layer import CostLayer
 
@@ -53,17 +54,7 @@ def cost_along(grid: OccupancyGrid, layer: CostLayer, points: ArrayLike) -> floa
     4.5
     """
     layer.check_fits(grid)
-    try:
-        xy = np.asarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InvalidValueError(
-            f"points are {points!r:.60}, expected finite numbers (x, y) of shape (n, 2): give each "
-            "point two"
-        ) from None
-    if xy.ndim != 2 or xy.shape[1] != 2 or not len(xy) or not np.isfinite(xy).all():  # noqa: PLR2004
-        raise InvalidValueError(
-            f"points must be finite numbers (x, y) of shape (n, 2), n >= 1, got shape {xy.shape}"
-        )
+    xy = checked_points(points)
     positions = _positions_on(grid.frame, xy)
     most = np.array(grid.shape, dtype=np.float64)
     outside = ((positions < -_OFF) | (positions > most + _OFF)).any(axis=1)

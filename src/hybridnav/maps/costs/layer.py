@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -206,7 +206,7 @@ class CostLayer:
         limits = checked_speeds(base, multiplier, unit, full_speed_mps)
         factor_of = rounded(limits.factors(MOST_FACTOR))
         on_map = mask_on_map(grid, checked_values(values), frame)
-        return cls(factor_of[on_map], source={"kind": "speed mask", **limits.source})
+        return cls(factor_of[on_map], source={"kind": "speed mask", **asdict(limits)})
 
     @classmethod
     def keepout_mask(

@@ -23,6 +23,7 @@ from hybridnav.maps import DEFAULT_MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.checks import checked_type
 from hybridnav.maps.files.image import Raster, read_raster
 from hybridnav.maps.files.limits import check_max_cells, check_size
+from hybridnav.maps.messages import levels_by_class
 
 _MODES = ("trinary", "scale", "raw")
 _BOOLEANS = {"true": True, "yes": True, "on": True, "y": True, "1": True} | {
@@ -454,13 +455,8 @@ def _decimal(value: float) -> str:
 
 def _pixels(grid: OccupancyGrid, where: str) -> ByteArray:
     """Return the image, uint8 (rows, cols), row 0 at the top."""
-    occupancy = occupancy_of_greys()
-    low, high = np.float32(grid.free_threshold), np.float32(grid.occupied_threshold)
-    greys = {
-        CellClass.FREE: np.flatnonzero(occupancy <= low),
-        CellClass.OCCUPIED: np.flatnonzero((occupancy >= high) & (occupancy > low)),
-        CellClass.UNEXPLORED: np.flatnonzero((occupancy > low) & (occupancy < high)),
-    }
+    thresholds = grid.free_threshold, grid.occupied_threshold
+    greys = levels_by_class(occupancy_of_greys(), thresholds)
     pixels = np.zeros(grid.shape, dtype=np.uint8)
     level = np.rint((1.0 - grid.probability.astype(np.float64)) * _WHITE)
     level[np.isnan(level)] = _UNKNOWN_GREY
@@ -470,7 +466,7 @@ def _pixels(grid: OccupancyGrid, where: str) -> ByteArray:
             continue
         if not allowed.size:
             raise MapError(
-                f"{where}: the thresholds {grid.free_threshold:g} and {grid.occupied_threshold:g} "
+                f"{where}: the thresholds {thresholds[0]:g} and {thresholds[1]:g} "
                 f"leave no grey of 8 bits for {kind.name.lower()} cells: set them wider apart"
             )
         pixels[cells] = np.clip(level[cells], allowed[0], allowed[-1])
