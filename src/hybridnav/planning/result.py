@@ -16,7 +16,6 @@ from typing_extensions import Self
 
 from hybridnav._base.copies import Source, copies_alike, frozen, made, made_state
 from hybridnav._base.extension import in_html
-from hybridnav._base.rows import in_runs
 from hybridnav._base.trig import dist
 from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, LongArray
 from hybridnav.errors import PlanError, renamed
@@ -439,7 +438,7 @@ def plan_many(
     points = found.points if found is not None and is_whole else np.empty((path_start[-1], 2))
     if found is not None and not is_whole:
         counts[left] = 0
-        points[in_runs(path_start[:-1], counts)] = found.points[in_runs(source, counts)]
+        points[_rows(path_start[:-1], counts)] = found.points[_rows(source, counts)]
     for i, path in paths.items():
         points[path_start[i] : path_start[i + 1]] = path
     has_yaw = starts.shape[1] > 2  # noqa: PLR2004
@@ -464,6 +463,12 @@ def _check_lengths(found: FoundMany, metric: str) -> None:
     stated_m, driven_m = found.cost_m[goes], driven_m[goes]
     for wrong in np.flatnonzero(~is_length(stated_m, driven_m))[:1]:
         check_length(stated_m[wrong], driven_m[wrong])
+
+
+def _rows(begin: LongArray, counts: LongArray) -> LongArray:
+    """Return the rows of runs that begin somewhere, one run after the other."""
+    before = np.cumsum(counts) - counts
+    return np.repeat(begin - before, counts) + np.arange(counts.sum())
 
 
 def _with_late(bound: FloatArray, late: dict[int, Callable[[], float]]) -> FloatArray:

@@ -62,7 +62,15 @@ def total(values):
 
 @njit(cache=True, nogil=True)
 def grow(array):
-    """Return a copy of an array with room for twice as many numbers, or rows."""
-    larger = np.empty((2 * len(array), *array.shape[1:]), array.dtype)
-    larger[: len(array)] = array
+    """Return a copy of an array with twice the room."""
+    larger = np.empty(2 * array.size, array.dtype)
+    larger[: array.size] = array
+    return larger
+
+
+@njit(cache=True, nogil=True)
+def grow_rows(rows):
+    """Return a copy of an array of rows with room for twice as many."""
+    larger = np.empty((2 * len(rows), rows.shape[1]), rows.dtype)
+    larger[: len(rows)] = rows
     return larger

@@ -7,7 +7,7 @@ generation, 2 * generation + 1 for one that is closed, less for one not yet seen
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow, grow_rows, pop, push
 from hybridnav._base.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT, octile_cost
 
 
@@ -133,7 +133,7 @@ def weighted_astar(moves, cols, start, goal, weight, cost_of, came, mark, genera
                 continue
             mark[to] = is_open
             if size == len(heap):
-                heap = grow(heap)
+                heap = grow_rows(heap)
             estimate = octile_cost(row + ROW_STEP[k] - goal_row, col + COL_STEP[k] - goal_col)
             push(heap, size, cost + weight * estimate, to)
             size += 1

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow_rows, pop, push
 
 SLACK = 6000
 """Delay with which a corner may still be contracted, in thousandths of a level. With 0 there are 3
@@ -229,7 +229,7 @@ def _room_for(parts, pool, used, tail, wanted):
     if size[tail] + wanted > room[tail]:
         room[tail] = 2 * (size[tail] + wanted)
         while used + room[tail] > pool.shape[0]:
-            pool = grow(pool)
+            pool = grow_rows(pool)
         pool[used : used + size[tail]] = pool[begin[tail] : begin[tail] + size[tail]]
         begin[tail] = used
         used += room[tail]

@@ -11,7 +11,7 @@ highway hierarchies, 2007.
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow, grow_rows, pop, push
 from hybridnav._base.kernels.moves import COL_STEP, DIAGONAL, ROW_STEP, STRAIGHT
 from hybridnav._base.moves import FAR
 
@@ -36,7 +36,7 @@ def climb(hierarchy, seeds, work, nodes, costs, n):
         if at_cost[k] < records[corner, 0]:
             records[corner, 0], records[corner, 1] = at_cost[k], may_follow[k]
             if size == len(heap):
-                heap = grow(heap)
+                heap = grow_rows(heap)
             push(heap, size, at_cost[k], np.int64(corner))
             size += 1
     begin = n
@@ -60,7 +60,7 @@ def climb(hierarchy, seeds, work, nodes, costs, n):
             records[other, 0] = further
             records[other, 1] = follow[kinds[other], packed & 63]
             if size == len(heap):
-                heap = grow(heap)
+                heap = grow_rows(heap)
             push(heap, size, further, other)
             size += 1
 
@@ -96,7 +96,7 @@ def costs_to_cells(grid, start, goals, left, best):
             if left == 0:
                 break
         if size + 8 > len(heap):
-            heap = grow(heap)
+            heap = grow_rows(heap)
         for k in range(8):
             if moves[cell] >> k & 1 == 0:
                 continue

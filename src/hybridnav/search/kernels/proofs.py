@@ -3,7 +3,7 @@
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow_rows, pop, push
 from hybridnav._base.kernels.moves import COL_STEP, FAR, ROW_STEP
 from hybridnav._base.trig import hypot
 
@@ -117,7 +117,7 @@ def walls_round(area, row, col):
     while True:
         beside = (ahead + 6) & 7
         if n + 2 > len(chain):
-            chain = grow(chain)
+            chain = grow_rows(chain)
         chain[n] = row + ROW_STEP[beside], col + COL_STEP[beside]
         n += 1
         next_row, next_col = row + ROW_STEP[ahead], col + COL_STEP[ahead]
@@ -280,12 +280,12 @@ def strings_of(walls, grain, ends, points, limit):
                         if whole < limit and over < length[line, to]:
                             length[line, to], before[line, to] = over, name
                             if size == len(heap):
-                                heap = grow(heap)
+                                heap = grow_rows(heap)
                             push(heap, size, int(whole * _FINE), line * cols + to)
                             size += 1
                     # It goes on where a path over its best point is short enough.
                     if left == len(shafts):
-                        shafts = grow(shafts)
+                        shafts = grow_rows(shafts)
                     ahead = abs(line - ends[1, 0])
                     height = abs(line - y)
                     best = (x * ahead + ends[1, 1] * height) / (ahead + height)
@@ -319,7 +319,7 @@ def strings_of(walls, grain, ends, points, limit):
                         if whole < limit and over < length[line, to]:
                             length[line, to], before[line, to] = over, name
                             if size == len(heap):
-                                heap = grow(heap)
+                                heap = grow_rows(heap)
                             push(heap, size, int(whole * _FINE), line * cols + to)
                             size += 1
                         break
@@ -334,7 +334,7 @@ def strings_of(walls, grain, ends, points, limit):
         if corner_row < 0:
             return heights[:count]
         if count == len(heights):
-            heights = grow(heights)
+            heights = grow_rows(heights)
         heights[count, 0], heights[count, 1] = corner_row - 1, corner_col - 1
         heights[count, 2] = length[corner_row, corner_col]
         count += 1

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hybridnav._base.jit import njit
-from hybridnav._base.kernels.arrays import grow
+from hybridnav._base.kernels.arrays import grow, grow_rows
 
 NO_ARC = -1
 """Arc of the corners that a search began with."""
@@ -32,7 +32,7 @@ def _unpack(arcs, entry, nodes, count):
             count += 1
             continue
         if depth + 2 > stack.shape[0]:
-            stack = grow(stack)
+            stack = grow_rows(stack)
         middle = past >> 32
         back, on = first[middle] + (past >> 16 & 0xFFFF), first[middle] + (past & 0xFFFF)
         if arc < 0:

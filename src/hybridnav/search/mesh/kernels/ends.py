@@ -3,7 +3,7 @@
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push
+from hybridnav._base.kernels.arrays import grow, grow_rows, pop, push
 from hybridnav._base.kernels.exact import turn_of
 from hybridnav.search.kernels.labels import climb
 from hybridnav.search.mesh.kernels.intervals import polygon_in, polygons_with
@@ -152,7 +152,7 @@ def costs_to_corners(mesh, edges, point, view, work):
         if view[1][k] < costs[corner]:
             costs[corner], came[corner] = view[1][k], -1
             if size == len(heap):
-                heap = grow(heap)
+                heap = grow_rows(heap)
             push(heap, size, costs[corner], np.int64(corner))
             size += 1
     while size > 0:
@@ -176,7 +176,7 @@ def costs_to_corners(mesh, edges, point, view, work):
             if further < costs[other]:
                 costs[other], came[other] = further, here
                 if size == len(heap):
-                    heap = grow(heap)
+                    heap = grow_rows(heap)
                 push(heap, size, further, np.int64(other))
                 size += 1
     return heap
