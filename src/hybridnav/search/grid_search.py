@@ -228,7 +228,7 @@ class GridSearch:
             while cost == BUCKET_FULL:
                 generation = work.next_generation()
                 of_work = work.records, generation, work.waiting
-                cost, expanded = KERNEL(moves, self._cols, endpoints, *given, *of_work)
+                cost, expanded = _kernels.astar(moves, self._cols, endpoints, *given, *of_work)
                 if cost == BUCKET_FULL:
                     work.waiting = np.empty(2 * work.waiting.size, dtype=np.int32)
             if cost < 0:
