@@ -169,7 +169,7 @@ def test_a_map_and_a_grid_alone_are_models_too(tmp_path: Path) -> None:
 
 @given(scene=scenes(), compress=...)
 @settings(max_examples=examples(40))
-def test_any_grid_comes_back_bit_by_bit(scene, tmp_path_factory, *, compress):
+def test_any_grid_comes_back_bit_by_bit(scene, tmp_path_factory, *, compress: bool):
     path = tmp_path_factory.mktemp("models") / "m.hnm"
     assert_alike(scene.grid, loaded(scene.grid, path, compress=compress).grid, set())
 
