@@ -14,8 +14,8 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_094,
-    "lines": 102_631,
+    "code": 65_097,
+    "lines": 102_636,
     "files": 438,
     "code outside ext": 50_126,
     "lines of a file, most": 600,
@@ -39,7 +39,7 @@ BUDGETS = {
     "cli": (3827, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),
-    "ext/fleet": (10200, 8),
+    "ext/fleet": (10205, 8),
     "ext/live": (7621, 8),
     "ext/page": (3208, 7),
     "graphs": (6485, 6),

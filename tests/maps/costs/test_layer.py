@@ -405,7 +405,7 @@ def test_a_point_costs_nothing_and_a_diagonal_passes_no_side_cell() -> None:
     ("points", "message"),
     [
         ([(0.5, 0.5), (2.5, 0.5)], "point (2.500, 0.500) m lies outside the map"),
-        ([(0.5, math.nan)], "points must be finite numbers"),
+        ([(0.5, math.nan)], "points need finite coordinates in metres"),
         (
             [0.5, 0.5],
             "points must be finite numbers (x, y) of shape (n, 2), n >= 1, got shape (2,)",

@@ -1,12 +1,17 @@
 """Whether a file describes a building: a module that a plan on one map loads quickly."""
 
+from __future__ import annotations
+
 import re
 from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hybridnav._base.files import MODEL_SUFFIX
-from hybridnav._base.typing import PathLike
 from hybridnav.errors import MapError
+
+if TYPE_CHECKING:
+    from hybridnav._base.typing import PathLike
 
 _FLOORS = re.compile(r"^[\"']?floors[\"']?\s*:", re.MULTILINE)
 _LOOKED_AT = 2**16
