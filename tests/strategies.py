@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ _EXAMPLES = float(os.environ.get("HYBRIDNAV_EXAMPLES", "0.3"))
 _PROBABILITY = {CellClass.OCCUPIED: 1.0, CellClass.FREE: 0.0, CellClass.UNEXPLORED: 0.5}
 _LETTERS = {"#": CellClass.OCCUPIED, ".": CellClass.FREE, "?": CellClass.UNEXPLORED}
 _CLASSES = st.sampled_from([1, 1, 2, 0])
+seeds = st.integers(0, 2**32 - 1)
 
 
 IS_FULL = "HYBRIDNAV_EXAMPLES" in os.environ
@@ -32,6 +34,11 @@ def examples(count: int, full: int = 0) -> int:
     """Return how many random examples a test tries: three in ten of those named, twice as many as
     named where `IS_FULL`, or then by the same factor of a number of their own."""
     return max(5, round((full if full and IS_FULL else count) * _EXAMPLES))
+
+
+def tried(count: int, /, *strategies: Any, **by_name: Any) -> Any:
+    """A test of random examples, as many as `examples` says."""
+    return lambda test: settings(max_examples=examples(count))(given(*strategies, **by_name)(test))
 
 
 def drawn(*lines: str) -> Classes:
@@ -107,7 +114,7 @@ def class_grids(draw: st.DrawFn, max_side: int = MAX_SIDE) -> Classes:
         draw(_figure_onto(classes))
     if kind == "noisy figures":
         speckle = draw(_noise(shape))
-        rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+        rng = np.random.default_rng(draw(seeds))
         struck = rng.random(shape) < draw(st.sampled_from([0.01, 0.03, 0.1, 0.3]))
         classes[struck] = speckle[struck]
     return classes
@@ -121,7 +128,7 @@ def _sides(max_side: int) -> st.SearchStrategy[int]:
 def _noise(draw: st.DrawFn, shape: tuple[int, int]) -> Classes:
     occupied = draw(st.sampled_from([0.0, 0.02, 0.1, 0.2, 0.4, 0.7]))
     unexplored = draw(st.sampled_from([0.0, 0.02, 0.1, 0.5, 0.9]))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     classes = np.where(rng.random(shape) < unexplored, 2, 1).astype(np.uint8)
     classes[rng.random(shape) < occupied] = CellClass.OCCUPIED
     return classes
@@ -195,7 +202,7 @@ def block_labels(shape: tuple[int, ...], rng: np.random.Generator) -> NDArray[np
 def labelled(draw: st.DrawFn) -> tuple[Classes, RoomLabels]:
     """A map, and labels on it that are blocks, noise, or one room for all."""
     classes = draw(class_grids(min(MAX_SIDE, 20)))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     n_rooms = draw(st.sampled_from([1, 2, 3, 200]))
     block = draw(st.integers(1, 9))
     rows, cols = classes.shape

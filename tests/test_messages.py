@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.messages import pose_message, quaternion_of, tilt_of, yaw_of
 from tests.layers import grid_of
-from tests.strategies import examples
+from tests.strategies import tried
 
 ZEROS = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 0.0}
 
@@ -55,8 +55,7 @@ def hamilton(a: Any, b: Any) -> tuple[float, float, float, float]:
     )
 
 
-@given(st.data())
-@settings(max_examples=examples(120), deadline=None)
+@tried(120, st.data())
 def test_values_and_frame_survive_a_round_trip(data: st.DataObject) -> None:
     rows, cols = data.draw(st.integers(1, 8)), data.draw(st.integers(1, 8))
     values = data.draw(st.lists(st.integers(-1, 100), min_size=rows * cols, max_size=rows * cols))
@@ -94,8 +93,7 @@ def test_values_and_frame_survive_a_round_trip(data: st.DataObject) -> None:
     assert np.allclose(again.frame.points_of([0, 0]), grid.frame.points_of([0, 0]), rtol=1e-12)
 
 
-@given(st.data())
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, st.data())
 def test_no_cell_changes_its_class_by_rounding(data: st.DataObject) -> None:
     thresholds = sorted(data.draw(st.lists(st.floats(0, 1), min_size=2, max_size=2, unique=True)))
     if np.float32(thresholds[0]) == np.float32(thresholds[1]):
@@ -137,8 +135,7 @@ def test_yaw_of_a_rotated_origin_turns_the_cells() -> None:
     assert grid.frame.points_of([0, 1]) == pytest.approx([9.0, 8.0])
 
 
-@given(*[st.floats(-math.pi, math.pi)] * 3)
-@settings(max_examples=examples(200), deadline=None)
+@tried(200, *[st.floats(-math.pi, math.pi)] * 3)
 def test_yaw_and_tilt_are_those_of_the_rotation(roll: float, pitch: float, yaw: float) -> None:
     parts = [
         (math.sin(roll / 2), 0, 0, math.cos(roll / 2)),
@@ -273,10 +270,11 @@ def test_spacing_of_path_messages_is_checked() -> None:
         path.to_message(spacing_m=0.0)
 
 
-@given(
-    st.lists(st.tuples(*[st.floats(-1e4, 1e4)] * 3), min_size=1, max_size=6), st.floats(500, 5000)
+@tried(
+    60,
+    st.lists(st.tuples(*[st.floats(-1e4, 1e4)] * 3), min_size=1, max_size=6),
+    st.floats(500, 5000),
 )
-@settings(max_examples=examples(60), deadline=None)
 def test_poses_are_found_again_in_the_message(poses: Any, spacing: float) -> None:
     """Yaw by the rotation of the x axis: (1 - 2 z z, 2 z w)."""
     points, headings = np.array(poses)[:, :2], np.array(poses)[:, 2]
@@ -320,8 +318,7 @@ LEAVES = (
 )
 
 
-@given(path=st.sampled_from(LEAVES), value=ANYTHING, whole=st.booleans())
-@settings(max_examples=examples(150), deadline=None)
+@tried(150, path=st.sampled_from(LEAVES), value=ANYTHING, whole=st.booleans())
 def test_whatever_stands_in_a_field_makes_a_grid_or_one_line(path, value, *, whole):
     hostile: Any = value if whole else message([0, 100], 2, 1)
     if not whole:

@@ -4,18 +4,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume
 
 from hybridnav._base.kernels.moves import field_distances
 from hybridnav._base.moves import length_in_cells
 from hybridnav.maps import CellClass
 from tests.oracle.grid import distances, move_graph
-from tests.strategies import block_labels, class_grids, examples
+from tests.strategies import block_labels, class_grids, seeds, tried
 
 
-@given(class_grids(), st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(60))
+@tried(60, class_grids(), seeds)
 def test_distances_inside_fields_are_those_that_dijkstra_finds(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     vertices = classes != CellClass.OCCUPIED

@@ -9,11 +9,10 @@ from typing import Any, Literal, NamedTuple
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridnav._base.kept import UnknownError, name_of
-from tests.strategies import examples
+from tests.strategies import tried
 
 ROOT = Path(__file__).parents[2]
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
@@ -72,8 +71,7 @@ values = st.recursive(
 )
 
 
-@given(values)
-@settings(max_examples=examples(100))
+@tried(100, values)
 def test_types_have_the_names_that_numba_gives_them(value: object) -> None:
     assert name_of(value) == str(numba.typeof(value))
 

@@ -7,7 +7,6 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from scipy import ndimage
 
 import hybridnav as hn
@@ -32,7 +31,7 @@ from hybridnav.harness.records import read_records
 from hybridnav.harness.run import RunSettings, write_records
 from tests.benchmarks.test_rival_faults import LIES, nothing, short
 from tests.harness.small_runs import ROOMS, ROOT, run_here, write_map
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 N_PAIRS = 12
 BY_NAME: dict[str, Any] = {"route graph": RouteGraphMethod, "swagger-like": SwaggerLike}
@@ -61,8 +60,7 @@ def office():
 # --- the graph in the manner of SWAGGER -----------------------------------------------------------
 
 
-@given(class_grids(20))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, class_grids(20))
 def test_every_edge_is_free_and_every_node_has_one(classes):
     grid = occupancy_grid(classes)
     free = grid.enterable(allow_unexplored=False)
@@ -74,8 +72,7 @@ def test_every_edge_is_free_and_every_node_has_one(classes):
         assert not segment_faults(grid, points[edge])
 
 
-@given(class_grids(16))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, class_grids(16))
 def test_branches_have_every_step_of_the_skeleton_once(classes):
     skeleton = skeleton_of(classes == hn.CellClass.FREE)
     cells = [tuple(cell) for cell in np.argwhere(skeleton).tolist()]

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -27,10 +26,10 @@ from tests.strategies import (
     Scene,
     class_grids,
     drawn,
-    examples,
     free_cells,
     occupancy_grid,
     scenes,
+    tried,
 )
 
 SIDES = st.sampled_from([2, 3, 5, 10, 64])
@@ -48,8 +47,7 @@ def passed(method: HpaStar, answer: MethodResult) -> list[int]:
     return [int(r) for i, r in enumerate(regions) if i == 0 or r != regions[i - 1]]
 
 
-@settings(max_examples=examples(60))
-@given(classes=class_grids(), side=SIDES, seed=st.integers(0, 1000))
+@tried(60, classes=class_grids(), side=SIDES, seed=st.integers(0, 1000))
 def test_paths_are_legal_never_too_short_and_found_where_there_is_one(classes, side, seed):
     grid = occupancy_grid(classes)
     enterable = classes == CellClass.FREE
@@ -79,8 +77,7 @@ def test_paths_are_legal_never_too_short_and_found_where_there_is_one(classes, s
             assert answers[0].nodes == answers[1].nodes == tuple(passed(raw, answers[0]))
 
 
-@settings(max_examples=examples(40))
-@given(classes=class_grids(), side=SIDES)
+@tried(40, classes=class_grids(), side=SIDES)
 def test_regions_are_the_connected_pieces_of_the_clusters(classes: Any, side: int) -> None:
     region_of = HpaStar(occupancy_grid(classes), cluster_cells=side).region_of
     enterable = classes == CellClass.FREE
@@ -100,8 +97,7 @@ def test_regions_are_the_connected_pieces_of_the_clusters(classes: Any, side: in
     assert seen == set(range(len(seen)))
 
 
-@settings(max_examples=examples(30))
-@given(classes=class_grids(24), side=SIDES)
+@tried(30, classes=class_grids(24), side=SIDES)
 def test_edges_are_shortest_paths_inside_clusters_and_steps_between_them(classes, side):
     method = HpaStar(occupancy_grid(classes), cluster_cells=side)
     graph = method._graph
@@ -237,8 +233,7 @@ def region_of(made: ThrunMap) -> Any:
     return made.region_of
 
 
-@settings(max_examples=examples(50))
-@given(scene=scenes(), epsilon=st.sampled_from([1, 2, 5, 10, 40]))
+@tried(50, scene=scenes(), epsilon=st.sampled_from([1, 2, 5, 10, 40]))
 def test_regions_partition_free_space_and_are_connected(scene: Scene, epsilon: int) -> None:
     made = ThrunMap(scene.grid, epsilon_cells=epsilon)
     regions = region_of(made)
@@ -250,8 +245,7 @@ def test_regions_partition_free_space_and_are_connected(scene: Scene, epsilon: i
     assert made.n_nodes >= components(free).max(initial=0)
 
 
-@settings(max_examples=examples(40))
-@given(scene=scenes(), epsilon=st.sampled_from([1, 3, 10]), seed=st.integers(0, 10**6))
+@tried(40, scene=scenes(), epsilon=st.sampled_from([1, 3, 10]), seed=st.integers(0, 10**6))
 def test_solvability_is_that_of_the_grid(scene: Scene, epsilon: int, seed: int) -> None:
     made = ThrunMap(scene.grid, epsilon_cells=epsilon)
     again = ThrunMap(scene.grid, epsilon_cells=epsilon)
@@ -279,8 +273,7 @@ def test_solvability_is_that_of_the_grid(scene: Scene, epsilon: int, seed: int) 
         assert recounted(answer.cells) >= recounted(optimum) - 1e-9
 
 
-@settings(max_examples=examples(40))
-@given(scene=scenes(), epsilon=st.sampled_from([1, 3, 10]))
+@tried(40, scene=scenes(), epsilon=st.sampled_from([1, 3, 10]))
 def test_critical_points_are_free_and_their_basis_points_are_obstacles_on_two_sides(scene, epsilon):
     made = ThrunMap(scene.grid, epsilon_cells=epsilon)
     padded = np.pad(scene.classes == CellClass.FREE, 1)

@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from research._rooms_agreement import compare_rooms
+from tests.strategies import seeds
 
 
-@given(true=st.lists(st.integers(0, 3), min_size=1, max_size=60), seed=st.integers(0, 2**32 - 1))
+@given(true=st.lists(st.integers(0, 3), min_size=1, max_size=60), seed=seeds)
 def test_agreement_is_full_for_equal_rooms_under_any_names(true, seed):
     labels = np.array(true)
     names = np.random.default_rng(seed).permutation(4) + 10

@@ -8,7 +8,6 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -16,7 +15,7 @@ from hybridnav.graphs import BUILDING_KINDS, KINDS, SEVERITIES, Finding
 from hybridnav.graphs.gather import Findings
 from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 HERE = topology_of(HOUSE, origin_m=(-3.0, 1.0), yaw_rad=0.4)
 SOUND = hn.graphs.build_lane_graph(HERE)
@@ -418,8 +417,7 @@ def test_every_kind_of_finding_is_planted_here_or_in_a_test_of_a_format():
     assert [kind for kind in KINDS if f'"{kind}"' not in text] == []
 
 
-@given(class_grids(16), st.data())
-@settings(max_examples=examples(60))
+@tried(60, class_grids(16), st.data())
 def test_free_nodes_and_edges_are_those_of_exact_geometry(classes, data):
     rows, cols = classes.shape
     coordinate = st.tuples(

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.spatial import KDTree
@@ -26,7 +25,7 @@ from tests.drawn_rooms import HOUSE, topology_of
 from tests.graphs.test_route_graph import boxes, map_of, slanted
 from tests.nav2_reader import read_nav2
 from tests.nav2_walk import Costmap
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 OTHERS = ("aws_small_warehouse/005/map.yaml", "strands/g4s/g4s_y2.yaml", "nav2/maps/depot.yaml")
 
@@ -71,8 +70,7 @@ def checked(topology, **options):
     return graph
 
 
-@given(class_grids(24))
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, class_grids(24))
 def test_any_map(classes):
     if (classes == hn.CellClass.FREE).any():
         topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes)))
@@ -277,8 +275,7 @@ def test_named_points_are_nodes_where_they_are(tmp_path, yaw_rad):
     assert apart.names[: graph.n_nodes] == graph.names
 
 
-@given(class_grids(20), st.integers(0, 99))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, class_grids(20), st.integers(0, 99))
 def test_named_points_of_any_map(classes, seed):
     topology = hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes)))
     rng = np.random.default_rng(seed)
@@ -354,8 +351,7 @@ def test_arguments_out_of_range_are_refused():
         build_lane_graph(floor(np.ones((20, 40))))
 
 
-@given(class_grids(16))
-@settings(max_examples=examples(80))
+@tried(80, class_grids(16))
 def test_thinned_cells_are_as_connected_as_before_and_thin(classes):
     inside = np.pad(classes == hn.CellClass.FREE, 1)
     clearance = ndimage.distance_transform_edt(inside)
@@ -381,8 +377,7 @@ def test_thinned_cells_are_as_connected_as_before_and_thin(classes):
     assert block.max(initial=0) < 9
 
 
-@given(class_grids(16))
-@settings(max_examples=examples(60))
+@tried(60, class_grids(16))
 def test_steps_spread_to_what_is_connected_and_about_as_far(classes):
     free = np.pad(classes == hn.CellClass.FREE, 1)
     if not free.any():

@@ -4,12 +4,11 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.graphs import build_lane_graph
-from tests.strategies import examples
+from tests.strategies import tried
 
 SIDE_M = 0.05
 WAYS = [*product((0, 1), repeat=3)][1:]
@@ -79,8 +78,7 @@ def assert_alike(one, other):
     assert ends[0] == ends[1]
 
 
-@given(offices(), st.sampled_from(WAYS), st.booleans())
-@settings(max_examples=examples(12), deadline=None)
+@tried(12, offices(), st.sampled_from(WAYS), st.booleans())
 def test_turned_and_mirrored_maps_have_turned_and_mirrored_lanes(office, way, has_rooms):
     cells, label_of = office
     labels = label_of if has_rooms else None

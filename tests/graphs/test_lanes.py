@@ -8,7 +8,6 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -16,7 +15,7 @@ from hybridnav.graphs import plot_graph_check
 from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, SIDE, topology_of
 from tests.nav2_reader import read_nav2
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 APART = 1.0
 
@@ -76,8 +75,7 @@ def _unit(step):
     return step / math.hypot(*step)
 
 
-@given(class_grids(20), st.sampled_from([0.5, 1.0, 2.0]))
-@settings(max_examples=examples(60))
+@tried(60, class_grids(20), st.sampled_from([0.5, 1.0, 2.0]))
 def test_lanes_are_free_and_cut_nothing(classes, apart_m):
     if not (classes == hn.CellClass.FREE).any():
         return

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -20,7 +19,7 @@ from tests.drawn_rooms import HOUSE, topology_of
 from tests.layers import grid_of
 from tests.nav2_reader import read_nav2
 from tests.nav2_walk import Costmap, line_cells
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 ROOT = Path(__file__).parents[2]
 RADIUS_M = 0.25
@@ -120,8 +119,7 @@ def test_lanes(apart_m, tmp_path):
     )
 
 
-@given(class_grids(14))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, class_grids(14))
 def test_any_map(classes):
     if not (classes == hn.CellClass.FREE).any():
         return
@@ -133,8 +131,7 @@ def test_any_map(classes):
         assert not costmap.collides(tuple(points[tail]), tuple(points[head]))
 
 
-@given(class_grids(12), st.data())
-@settings(max_examples=examples(100), deadline=None)
+@tried(100, class_grids(12), st.data())
 def test_walks_are_those_of_nav2(classes, data):
     free = classes == hn.CellClass.FREE
     cell = st.tuples(*(st.integers(0, side - 1) for side in free.shape))

@@ -9,8 +9,7 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example
 from PIL import Image
 
 import hybridnav as hn
@@ -19,7 +18,7 @@ from hybridnav.route import DoorGraph, door_graph
 from tests.door_alternatives import Planned, check_alternatives, two_points
 from tests.floors import random_floor
 from tests.layers import layer_of
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
 
 def weighted_moves(floor: Any, layer: hn.CostLayer, doors: Any = None) -> Any:
@@ -38,8 +37,7 @@ def random_layer(floor: Any, rng: np.random.Generator) -> hn.CostLayer:
     return layer_of(rng.choice([1.0, 1.5, 6.0], grid.shape))
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(seed=st.integers(0, 2**32 - 1))
+@tried(40, seed=seeds)
 def test_each_is_the_cheapest_path_by_its_doors_and_within_the_limits(seed: int) -> None:
     def by_costs(floor: Any, rng: np.random.Generator) -> Planned:
         layer, grid = random_layer(floor, rng), floor.topology.grid
@@ -55,8 +53,7 @@ def test_each_is_the_cheapest_path_by_its_doors_and_within_the_limits(seed: int)
         assert other.result.metric == "weighted"
 
 
-@settings(max_examples=examples(30), deadline=None)
-@given(seed=st.integers(0, 2**32 - 1))
+@tried(30, seed=seeds)
 @example(seed=1058)  # two legs that rounding to 1 / 80782 of a cell brings below the path
 def test_the_first_route_on_the_graph_of_doors_costs_what_its_legs_do(seed: int) -> None:
     """Legs run from middle to middle of the boundaries, so no route is cheaper than the path."""

@@ -7,13 +7,11 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import hybridnav as hn
 from tests.door_alternatives import Planned, check_alternatives, doors_by_cells, line_of, two_points
 from tests.floors import random_floor
-from tests.strategies import examples, occupancy_grid
+from tests.strategies import occupancy_grid, seeds, tried
 
 PRESETS = ["shortest", "octile", "grid-astar", "paper"]
 
@@ -22,8 +20,7 @@ def planner_of(floor, preset="grid-astar"):
     return hn.HybridPlanner(floor.topology, preset=preset)
 
 
-@settings(max_examples=examples(60), deadline=None)
-@given(seed=st.integers(0, 2**32 - 1))
+@tried(60, seed=seeds)
 def test_each_is_the_shortest_path_by_its_doors_and_within_the_limits(seed):
     def by_lengths(floor, _rng):
         return Planned(planner_of(floor), floor.moves, lambda line: line.length)
@@ -48,13 +45,13 @@ def test_no_sequence_of_doors_within_the_limits_is_shorter_than_the_second():
         own = line_of(found[0].path).buffer(planner.grid.resolution_m)
         plain_doors = doors_by_cells(floor, found[0].path)
         darts = floor.darts(first, last)
-        for tried, path in enumerate(nx.shortest_simple_paths(darts, "start", "goal", "weight")):
+        for n_tried, path in enumerate(nx.shortest_simple_paths(darts, "start", "goal", "weight")):
             doors = [number for number, _ in path[1:-1]]
             rooms = floor.rooms_passed(first, path[1:-1])
             inside = floor.moves(doors=set(doors))
             cells = nx.dijkstra_path(inside, first, last)
             length = nx.path_weight(inside, cells, "weight")
-            if tried == 200 or nx.path_weight(darts, path, "weight") > 3 * found[0].path.length_m:
+            if n_tried == 200 or nx.path_weight(darts, path, "weight") > 3 * found[0].path.length_m:
                 break
             if len(set(rooms)) < len(rooms) or doors == plain_doors:
                 continue

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -18,7 +17,7 @@ from hybridnav.guide.words import Instruction, sentences
 from hybridnav.guide.words.itinerary import instructions_of
 from tests.drawn_rooms import HOUSE, SIDE, house, topology_of
 from tests.oracle.bends import Windows, simplified_corners
-from tests.strategies import examples
+from tests.strategies import tried
 
 
 def turns_of(instructions: tuple[Instruction, ...]) -> list[tuple[float, float]]:
@@ -248,8 +247,7 @@ def mazes(draw: st.DrawFn) -> tuple[set[frozenset[Any]], Any, Any]:
     return kept, start, draw(st.sampled_from([node for node in nodes if node != start]))
 
 
-@settings(max_examples=examples(30), deadline=None)
-@given(maze=mazes(), preset=st.sampled_from(["shortest", "octile"]))
+@tried(30, maze=mazes(), preset=st.sampled_from(["shortest", "octile"]))
 def test_words_replayed_on_the_graph_of_corridors_reach_the_goal(maze, preset):
     """A turtle that knows the corridors and the words alone."""
     corridors, start, goal = maze

@@ -7,7 +7,6 @@ from typing import cast
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridnav._base.moves import path_length_in_cells
@@ -23,7 +22,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.topology import TopologicalMap
 from tests.harness import faulty_methods as faulty
-from tests.strategies import drawn, examples, occupancy_grid, scenes
+from tests.strategies import drawn, occupancy_grid, scenes, tried
 
 LINKAGES = ("survivor", "radius", "diameter")
 
@@ -72,8 +71,7 @@ def consistency_of(topology):
 # --- nothing is wrong where nothing is ----------------------------------------------------------
 
 
-@settings(max_examples=examples(60))
-@given(scenes(max_side=16), st.sampled_from(LINKAGES))
+@tried(60, scenes(max_side=16), st.sampled_from(LINKAGES))
 def test_the_pyramid_is_consistent_on_any_map(scene, linkage):
     topology = topology_of(scene.grid, scene.merge_distance_m, linkage)
     checks = consistency_of(topology)
@@ -94,8 +92,7 @@ def test_the_pyramid_is_consistent_on_any_map(scene, linkage):
                 assert checks.check_walk(path) is None
 
 
-@settings(max_examples=examples(40))
-@given(scenes(max_side=12))
+@tried(40, scenes(max_side=12))
 def test_regions_of_any_kind_are_judged_without_arcs(scene):
     free = scene.classes == CellClass.FREE
     alone = np.where(free, np.arange(free.size).reshape(free.shape), -1).astype(np.int32)
@@ -314,8 +311,7 @@ def test_whatever_method_has_something_to_close_is_closed():
     Prepared(GridAstar(ROOMS), None, 0, 0).close()
 
 
-@settings(max_examples=examples(60))
-@given(scene=scenes(max_side=9), seed=st.integers(0, 10**6))
+@tried(60, scene=scenes(max_side=9), seed=st.integers(0, 10**6))
 def test_the_shortest_path_in_order_is_that_of_all_walks(scene, seed) -> None:
     grid = scene.grid
     free = np.argwhere(grid.classes == CellClass.FREE)

@@ -23,8 +23,7 @@ from hybridnav.maps.costs import cost_along
 from tests.harness import faulty_costs as faulty
 from tests.harness.small_runs import ROOMS, name_of, outcome_of, run_here, write_map
 from tests.layers import layer_of
-from tests.oracle.grid import distances, move_graph
-from tests.search.test_grid_search import weighted
+from tests.oracle.grid import distances, move_graph, weighted
 
 FAULTS = {
     faulty.DearSaidOptimal: "is above the weighted optimum",

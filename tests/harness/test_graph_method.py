@@ -6,7 +6,6 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -16,7 +15,7 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.harness.records import read_records
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.harness.small_runs import ROOMS, write_map
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 
 def sees(grid, one, other):
@@ -53,8 +52,7 @@ def without_passed(grid, end, nodes):
     return nodes[1:] if along > 0 and sees(grid, end, nodes[1]) else nodes
 
 
-@given(class_grids(14), st.data())
-@settings(max_examples=examples(100))
+@tried(100, class_grids(14), st.data())
 def test_routes_are_those_of_the_policy(classes, data):
     free = np.argwhere(classes == hn.CellClass.FREE)
     if not len(free):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import ndimage
@@ -18,7 +18,7 @@ from hybridnav.maps import MAX_CELLS, CellClass, Frame, OccupancyGrid
 from hybridnav.maps.areas import box_of_area
 from hybridnav.maps.clearance import clearance_cells, within_radius
 from hybridnav.maps.geometry import centres, position_of
-from tests.strategies import class_grids, examples
+from tests.strategies import class_grids, tried
 
 FREE, OCCUPIED, UNEXPLORED = CellClass.FREE, CellClass.OCCUPIED, CellClass.UNEXPLORED
 
@@ -247,8 +247,7 @@ def cells_of(found: tuple[int, int, int, int]) -> Any:
     return inside
 
 
-@given(st.lists(COORDINATES, min_size=4, max_size=4), st.sampled_from([0.0, 0.7]))
-@settings(max_examples=examples(100))
+@tried(100, st.lists(COORDINATES, min_size=4, max_size=4), st.sampled_from([0.0, 0.7]))
 def test_a_box_holds_each_cell_that_an_area_overlaps(at: list[float], yaw: float) -> None:
     (x_min, x_max), (y_min, y_max) = sorted(at[::2]), sorted(at[1::2])
     frame = hn.Frame(0.5, (1.0, -1.0), yaw)

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from tests.maps.random_worlds import count
-from tests.strategies import examples
+from tests.strategies import examples, tried
 
 SIDE = 0.25
 BOUNDS = (-1.0, -1.0, 2.0, 2.0)
@@ -59,7 +59,7 @@ def _grown(shapes, radii_m, factor):
     )
 
 
-@given(world=worlds())
+@tried(100, world=worlds())
 @example(
     (
         [shapely.LineString([(0, 0), (0, 0.125)]), shapely.LineString([(-0.125, 0), (1.75, 0.75)])],
@@ -76,7 +76,6 @@ def _grown(shapes, radii_m, factor):
         [0.125, 0.125],
     )
 )
-@settings(max_examples=examples(100))
 def test_cells_are_blocked_as_polygons_inside_and_outside_of_the_shapes_say(world):
     shapes, radii_m = world
     feasible, bounding = hn.grids_of_shapes(shapes, SIDE, BOUNDS, radii_m=radii_m)

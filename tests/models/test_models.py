@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 import hybridnav as hn
 from benchmarks.worlds import figure1_world
@@ -18,7 +17,7 @@ from hybridnav.pyramid.record import Record
 from hybridnav.search.mesh import ConvexMesh, CornerGraph, CornerHierarchy, MeshSearch
 from hybridnav.search.octile.jumps import JumpGraph
 from tests.product.test_copies import assert_alike, kernels
-from tests.strategies import examples, scenes
+from tests.strategies import scenes, tried
 
 START, GOAL = (0.55, 0.55), (2.55, 2.85)
 PRESETS = [name for name in hn.preset_names() if name != "ompl"]
@@ -167,8 +166,7 @@ def test_a_map_and_a_grid_alone_are_models_too(tmp_path: Path) -> None:
     assert model.planner().plan("west", "ost ä").solved
 
 
-@given(scene=scenes(), compress=...)
-@settings(max_examples=examples(40))
+@tried(40, scene=scenes(), compress=...)
 def test_any_grid_comes_back_bit_by_bit(scene, tmp_path_factory, *, compress: bool):
     path = tmp_path_factory.mktemp("models") / "m.hnm"
     assert_alike(scene.grid, loaded(scene.grid, path, compress=compress).grid, set())

@@ -52,6 +52,22 @@ def distances(graph: Moves, shape: tuple[int, int], source: Cell) -> Floats:
     return csgraph.dijkstra(graph, directed=False, indices=[flat]).reshape(shape)
 
 
+def weighted(graph: Any, factors: Any) -> Any:
+    """Graph of moves with lengths times the mean factors of their cells, as floats."""
+    entries = graph.tocoo()
+    tails, heads = entries.coords
+    flat = factors.ravel()
+    weights = entries.data * (flat[tails] + flat[heads]) / 2
+    return sparse.coo_array((weights, (tails, heads)), shape=graph.shape).tocsr()
+
+
+def counted(cells: Any, factors: Any) -> float:
+    """Cost of a path of cells, counted move by move."""
+    along = factors[cells[:, 0], cells[:, 1]]
+    lengths = np.hypot(*np.diff(cells, axis=0).T)
+    return float((lengths * (along[1:] + along[:-1]) / 2).sum())
+
+
 def assert_legal(cells: Any, enterable: Bools, standable: Bools | None = None) -> None:
     """Assert that a path stands on legal cells and moves legally; corners on the whole grid."""
     path = np.asarray(cells)

@@ -13,7 +13,7 @@ from scipy import ndimage
 
 from hybridnav.maps import CellClass
 from tests.oracle.pyramid import EAST, EIGHT, NORTH, SOUTH, WEST, AnyArray, Cell
-from tests.strategies import Scene, class_grids
+from tests.strategies import Scene, class_grids, seeds
 
 TURN = (EAST, NORTH, WEST, SOUTH)
 _SHARE_OF_PAIRS = 0.25
@@ -137,7 +137,7 @@ def nested_maps(draw: st.DrawFn, max_side: int) -> AnyArray:
     """Draw maps of rings in rings, up to four deep and side by side, some of them broken."""
     sides = st.integers(3, max_side)
     classes = np.full((draw(sides), draw(sides)), draw(st.sampled_from([1, 1, 2])), np.uint8)
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     _fill(classes, rng, draw(st.integers(1, 4)))
     for _ in range(draw(st.sampled_from([0, 0, 2, 5]))):
         classes[rng.integers(len(classes)), rng.integers(classes.shape[1])] = rng.integers(3)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon
 from shapely import box as area
@@ -17,8 +16,8 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
 from tests.oracle.any_angle_cost import SidePoints
-from tests.planning.test_costs import optimum_m, random_layer, scene, seeds, topology_of
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.planning.test_costs import optimum_m, random_layer, scene, topology_of
+from tests.strategies import class_grids, occupancy_grid, seeds, tried
 
 
 def preset_of() -> hn.Preset:
@@ -61,8 +60,7 @@ def told(result: hn.PlanResult) -> tuple[Any, ...]:
     return result.status, result.cost, result.lower_bound, points
 
 
-@given(class_grids(max_side=12), seeds)
-@settings(max_examples=examples(25), deadline=None)
+@tried(25, class_grids(max_side=12), seeds)
 def test_paths_are_legal_and_no_path_is_below_their_bound(classes: Any, seed: int) -> None:
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
     planner = hn.HybridPlanner(topology_of(grid), preset=preset_of(), costs=layer)
@@ -109,8 +107,7 @@ def test_paths_cost_little_more_than_the_best_that_a_fine_graph_finds() -> None:
     assert max(excess) <= 0.04
 
 
-@given(class_grids(max_side=20), seeds, st.booleans(), st.booleans())
-@settings(max_examples=examples(40), deadline=None)
+@tried(40, class_grids(max_side=20), seeds, st.booleans(), st.booleans())
 def test_answers_follow_updates_as_a_planner_made_anew(classes, seed, prepared, has_own):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
@@ -159,8 +156,7 @@ def test_answers_follow_updates_as_a_planner_made_anew(classes, seed, prepared, 
             planner.prepare()
 
 
-@given(class_grids(max_side=20), seeds, st.booleans())
-@settings(max_examples=examples(20), deadline=None)
+@tried(20, class_grids(max_side=20), seeds, st.booleans())
 def test_a_changed_map_is_planned_on_as_by_a_planner_made_anew(classes, seed, has_own):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -15,7 +14,7 @@ from hybridnav.harness.baselines import Solver
 from hybridnav.harness.baselines.grid import GridAstar
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.maps import CellClass
-from tests.strategies import MAX_SIDE, drawn, examples
+from tests.strategies import MAX_SIDE, drawn, seeds, tried
 
 PRESETS = ["paper", "octile", "grid-astar"]
 # Two free places that only a move between two blocked cells joins.
@@ -44,7 +43,7 @@ def pairs(enterable: Any, seed: int, n: int) -> Any:
 def mazes(draw: Any) -> Any:
     """Small maps with many moves between two blocked cells."""
     side = st.integers(2, min(9, MAX_SIDE))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     classes = rng.choice(np.array([0, 1, 2], np.uint8), (draw(side), draw(side)), p=[0.4, 0.5, 0.1])
     return cutting_map(classes, draw(st.sampled_from([1.5, 3.0, 50.0])))
 
@@ -58,8 +57,7 @@ def test_a_path_between_two_blocked_cells_is_found(preset: str) -> None:
     assert result.route.arcs == (-1,)
 
 
-@given(topology=mazes(), seed=st.integers(0, 99))
-@settings(max_examples=examples(25), deadline=None)
+@tried(25, topology=mazes(), seed=st.integers(0, 99))
 def test_every_status_is_true(topology: hn.TopologicalMap, seed: int) -> None:
     grid = topology.grid
     for preset in PRESETS:
@@ -83,8 +81,7 @@ def test_every_status_is_true(topology: hn.TopologicalMap, seed: int) -> None:
                 assert result.cost >= result.lower_bound - 1e-9
 
 
-@given(topology=mazes(), seed=st.integers(0, 99))
-@settings(max_examples=examples(25), deadline=None)
+@tried(25, topology=mazes(), seed=st.integers(0, 99))
 def test_no_baseline_denies_a_path_that_exists(topology: hn.TopologicalMap, seed: int) -> None:
     grid = topology.grid
     part = joined(grid.enterable())

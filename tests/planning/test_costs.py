@@ -6,18 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
-from tests.oracle.grid import assert_legal, distances, move_graph
-from tests.search.test_grid_search import weighted
-from tests.strategies import class_grids, examples, occupancy_grid
-
-seeds = st.integers(0, 2**32 - 1)
+from tests.oracle.grid import assert_legal, distances, move_graph, weighted
+from tests.strategies import class_grids, occupancy_grid, seeds, tried
 
 
 def topology_of(grid: hn.OccupancyGrid, rooms: Any = None) -> hn.TopologicalMap:
@@ -56,8 +53,7 @@ def optimum_m(grid: hn.OccupancyGrid, layer: hn.CostLayer, is_open: Any, start: 
     return distances(graph, grid.shape, start) * grid.resolution_m
 
 
-@given(class_grids(max_side=20), seeds)
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, class_grids(max_side=20), seeds)
 def test_the_path_is_the_cheapest_with_gap_0(classes: Any, seed: int) -> None:
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)
@@ -85,8 +81,7 @@ def test_the_path_is_the_cheapest_with_gap_0(classes: Any, seed: int) -> None:
         assert around.lower_bound <= least * (1 + 1e-9)
 
 
-@given(class_grids(max_side=24), seeds, st.booleans())
-@settings(max_examples=examples(100), deadline=None)
+@tried(100, class_grids(max_side=24), seeds, st.booleans())
 def test_the_any_angle_finish_never_raises_the_cost(classes, seed, off_centre):
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
     planner = hn.HybridPlanner(topology_of(grid), preset="grid-astar", costs=layer)

@@ -21,8 +21,7 @@ from hybridnav.maps.costs import cost_along
 from tests.floors import random_floor
 from tests.harness.small_runs import run_here
 from tests.layers import grid_of, layer_of
-from tests.oracle.grid import assert_legal, distances, move_graph
-from tests.search.test_grid_search import weighted
+from tests.oracle.grid import assert_legal, distances, move_graph, weighted
 
 HONOUR = {"grid-astar": True, "paper": False, "robot": False}
 """Presets that plan by costs, and whether their paths of cells are the cheapest."""

@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 from shapely.geometry import Point, shape
 
 import hybridnav as hn
 from tests.layers import grid_of
-from tests.strategies import class_grids, examples, labelled, occupancy_grid
+from tests.strategies import class_grids, labelled, occupancy_grid, tried
 
 NAMES = ("kitchen, big", 'the "lab"', "Büro;1", "=1+1", "-7")
 
@@ -57,8 +56,7 @@ coordinates = st.floats(-1000, 1000)
 lines = st.lists(st.tuples(coordinates, coordinates), min_size=1, max_size=8)
 
 
-@given(lines, st.floats(5, 500), st.booleans())
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, lines, st.floats(5, 500), st.booleans())
 def test_paths_survive_every_format(tmp_path_factory, points, spacing, faces):
     folder = tmp_path_factory.mktemp("path")
     headings: Any = np.linspace(0, 1, len(points)) if faces else None
@@ -135,8 +133,7 @@ def test_without_a_path_a_file_is_empty_and_sound(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "n.json").read_text())["poses"] == []
 
 
-@given(labelled(), st.sampled_from([0.05, 0.5]), st.floats(-3, 3))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, labelled(), st.sampled_from([0.05, 0.5]), st.floats(-3, 3))
 def test_rooms_survive_both_formats(tmp_path_factory, drawn, side, yaw):
     classes, labels = drawn
     few = [name for name in labels.names if (labels.label_of == labels.index(name)).any()]
@@ -185,8 +182,7 @@ def test_rooms_survive_both_formats(tmp_path_factory, drawn, side, yaw):
         assert max((area.distance(point) for point in points), default=0.0) <= reach
 
 
-@given(class_grids(14), st.floats(-3, 3), st.integers(1, 12))
-@settings(max_examples=examples(40), deadline=None)
+@tried(40, class_grids(14), st.floats(-3, 3), st.integers(1, 12))
 def test_places_survive_both_formats(tmp_path_factory, classes, yaw, first):
     tmp_path = tmp_path_factory.mktemp("places")
     frame = hn.Frame(0.1, (3.0, 4.0), yaw)

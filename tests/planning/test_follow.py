@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -18,9 +17,8 @@ from hybridnav.harness.judges import VisibilityGraph, segment_faults
 from tests.interrupts import Struck, lines_of
 from tests.layers import layer_of
 from tests.oracle.grid import assert_legal, distances, move_graph
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, seeds, tried
 
-SEEDS = st.integers(0, 2**32 - 1)
 FOLLOWING = "shortest", "octile", "grid-astar"
 REBUILT = ("paper",)
 
@@ -72,8 +70,7 @@ def check(planner: hn.HybridPlanner, grid: hn.OccupancyGrid, rng: np.random.Gene
 
 
 @pytest.mark.parametrize("preset", FOLLOWING)
-@settings(max_examples=examples(30), deadline=None)
-@given(class_grids(max_side=24), SEEDS)
+@tried(30, class_grids(max_side=24), seeds)
 def test_answers_after_each_change_are_optimal(preset: str, classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid = replace(occupancy_grid(classes, resolution_m=0.5), robot_radius_m=rng.choice([0, 0.6]))
@@ -113,8 +110,7 @@ def test_answers_of_octile_after_changes_are_those_of_a_planner_made_anew(seed: 
 
 
 @pytest.mark.parametrize("preset", REBUILT)
-@settings(max_examples=examples(8), deadline=None)
-@given(class_grids(max_side=16), SEEDS)
+@tried(8, class_grids(max_side=16), seeds)
 def test_presets_on_places_follow_with_the_places_of_now(preset, classes, seed):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)
@@ -323,8 +319,7 @@ def factors_of(grid: hn.OccupancyGrid, rng: np.random.Generator) -> hn.CostLayer
 
 
 @pytest.mark.parametrize("preset", ["robot", "paper", "grid-astar"])
-@settings(max_examples=examples(6), deadline=None)
-@given(SEEDS, st.booleans())
+@tried(6, seeds, st.booleans())
 def test_given_costs_stay_with_their_cells_on_a_changed_map(preset, seed, prepared):
     """A planner that followed answers as one that is made of the map and the costs of now."""
     rng = np.random.default_rng(seed)

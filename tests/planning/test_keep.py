@@ -5,14 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
 
 import hybridnav as hn
 from hybridnav.harness.judges import segment_faults
-from tests.planning.test_costs import scene, seeds, topology_of
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.planning.test_costs import scene, topology_of
+from tests.strategies import class_grids, occupancy_grid, seeds, tried
 
 _CLASSES = hn.CellClass.FREE, hn.CellClass.OCCUPIED
 
@@ -23,8 +22,7 @@ def is_rest(new: Any, old: Any) -> bool:
     return n <= len(old) and np.array_equal(new[1:], old[len(old) - n :])
 
 
-@given(class_grids(max_side=24), seeds, st.sampled_from([0.0, 0.02, 0.5]))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, class_grids(max_side=24), seeds, st.sampled_from([0.0, 0.02, 0.5]))
 def test_the_rest_is_kept_while_it_is_cheap_enough(classes: Any, seed: int, within: float) -> None:
     grid, layer, is_open, *cells, rng = scene(classes, seed)
     preset = hn.load_preset("robot", overrides=[f"planner.keep_within={within}"])
@@ -132,8 +130,7 @@ def test_a_kept_path_does_not_bend_between_cells_that_meet_at_a_corner() -> None
     assert [2.0, 0.5] not in new.path.points.tolist()
 
 
-@given(class_grids(max_side=16), seeds, st.sampled_from(["shortest", "octile"]))
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, class_grids(max_side=16), seeds, st.sampled_from(["shortest", "octile"]))
 def test_shortest_paths_are_kept_while_they_are_legal_and_hardly_longer(classes, seed, preset):
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)

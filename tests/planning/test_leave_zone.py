@@ -1,47 +1,29 @@
 """Starts in closed cells, and the way out of them, judged by Dijkstra of scipy."""
 
-import itertools
 import math
 from typing import Any
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
+from tests.oracle.grid import distances, move_graph
 from tests.planning.test_costs import topology_of
-from tests.strategies import class_grids, examples
+from tests.strategies import class_grids, seeds, tried
 
 FRAME = hn.Frame(resolution_m=0.5, origin_m=(-3.0, 7.0), yaw_rad=0.4)
 ENDS = (0.5, 0.5), (5.5, 0.5)
 
 
-def lengths(is_open: Any, start: tuple[int, int]) -> Any:
-    """Least lengths of paths of open cells in cells; a diagonal needs both cells beside it."""
-    shape, edges = is_open.shape, []
-    steps = [step for step in itertools.product((-1, 0, 1), repeat=2) if any(step)]
-    for row, col in np.argwhere(is_open).tolist():
-        for down, right in steps:
-            cells = [(row + down, col + right), (row + down, col), (row, col + right)]
-            if all(0 <= r < shape[0] and 0 <= c < shape[1] and is_open[r, c] for r, c in cells):
-                to = (row + down) * shape[1] + col + right
-                edges.append((row * shape[1] + col, to, math.sqrt(down * down + right * right)))
-    one, other, cost = np.array(edges).reshape(-1, 3).T
-    graph = csr_matrix((cost, (one, other)), shape=(is_open.size, is_open.size))
-    return dijkstra(graph, indices=start[0] * shape[1] + start[1]).reshape(shape)
-
-
-@given(
+@tried(
+    80,
     class_grids(max_side=12),
     st.sampled_from(["octile", "grid-astar", "shortest", "robot"]),
-    st.integers(0, 2**32 - 1),
+    seeds,
 )
-@settings(max_examples=examples(80), deadline=None)
 def test_it_leaves_by_the_shortest_way_and_goes_on_by_the_best_path(classes, preset, seed):
     rng = np.random.default_rng(seed)
     probability = np.array([0.0, 1.0, 0.5])[np.searchsorted([0, 1, 2], classes)]
@@ -63,7 +45,7 @@ def test_it_leaves_by_the_shortest_way_and_goes_on_by_the_best_path(classes, pre
     assert plain.leaves_m is None
     found = planner.plan(*ends, blocked=blocked, leave_zone=True)
     # Oracle: from the start over all cells without walls to the nearest open one.
-    out = lengths(free, start)[is_open].min(initial=math.inf)
+    out = distances(move_graph(free), free.shape, start)[is_open].min(initial=math.inf)
     if math.isinf(out):
         assert found.status == plain.status
         assert found.leaves_m is None
@@ -83,12 +65,12 @@ def test_it_leaves_by_the_shortest_way_and_goes_on_by_the_best_path(classes, pre
     if preset in {"octile", "grid-astar"}:
         steps = np.abs(np.diff(rows_cols[: first + 1], axis=0)).sum(axis=1)
         way = np.sqrt(steps).sum()
-        rest = lengths(is_open, tuple(rows_cols[first].tolist()))[goal]
+        rest = distances(move_graph(is_open), is_open.shape, tuple(rows_cols[first].tolist()))[goal]
         if way > out + 1e-9:
             # The cells of the shortest way are open: the last move out of them may be a diagonal.
             assert way <= out + math.sqrt(2) - 1 + 1e-9
             is_open[tuple(rows_cols[:first].T)] = True
-            way, rest = 0, lengths(is_open, start)[goal]
+            way, rest = 0, distances(move_graph(is_open), is_open.shape, start)[goal]
         assert found.cost == pytest.approx(0.5 * (way + rest))
         assert found.lower_bound == pytest.approx(found.cost)
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.scenes import sample_pairs
 from tests.oracle.grid import assert_legal, recounted
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, seeds, tried
 
 MAPS = [
     "nav2/maps/depot.yaml",
@@ -51,8 +51,7 @@ def assert_same(found: hn.PlanResult, expected: hn.PlanResult, enterable: Any) -
         assert (found.path.points[[0, -1]] == expected.path.points[[0, -1]]).all()
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(class_grids(), st.booleans(), st.integers(0, 2**32 - 1))
+@tried(40, class_grids(), st.booleans(), seeds)
 def test_it_answers_what_the_whole_grid_answers(classes: Any, unexplored: bool, seed: int) -> None:
     grid = occupancy_grid(classes)
     assume((classes != 0).any())

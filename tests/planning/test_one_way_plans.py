@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 from scipy import sparse
 from scipy.sparse import csgraph
 
@@ -19,9 +18,9 @@ from hybridnav.search.found import ClosedCells
 from tests.closures.test_one_way import STEPS, forbidden_by
 from tests.oracle.grid import assert_legal, move_graph
 from tests.plans import PLAIN, PRESETS, TWO_ROOMS, map_of, points_in, scene_map
-from tests.strategies import Scene, occupancy_grid, scenes
+from tests.strategies import Scene, occupancy_grid, scenes, seeds
 
-SEED = st.integers(0, 2**32 - 1)
+SEED = seeds
 
 
 def drawn_sides(grid: hn.OccupancyGrid, seed: int) -> DirectedSides:

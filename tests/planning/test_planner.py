@@ -13,14 +13,14 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
 from tests.oracle.corridors import corridor_of
 from tests.oracle.grid import assert_legal, centre, components, distances, move_graph, recounted
-from tests.strategies import drawn, examples, occupancy_grid, scenes
+from tests.strategies import drawn, occupancy_grid, scenes, seeds, tried
 
 MAPS = Path(__file__).parents[2] / "maps"
 OPEN = drawn(*["." * 9] * 6)
@@ -198,8 +198,7 @@ def test_gap_of_a_corridor_is_that_to_the_best_path_of_the_whole_map() -> None:
     assert hybrid.gap == pytest.approx(hybrid.cost / whole.cost - 1, abs=1e-12)
 
 
-@given(scenes(max_side=16), st.integers(0, 2**32 - 1), st.sampled_from(["true", "false"]))
-@settings(max_examples=examples(50))
+@tried(50, scenes(max_side=16), seeds, st.sampled_from(["true", "false"]))
 def test_routes_paths_and_bounds_are_right_on_random_maps(scene, seed, allow_unexplored):
     grid = scene.grid
     enterable = grid.classes == CellClass.FREE

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import hybridnav as hn
 from hybridnav.planning import PyramidSettings, planner_settings
 from hybridnav.planning.preset import is_preset_name
+from tests.strategies import seeds
 
 PLANNERS = Path(__file__).parents[2] / "planners"
 
@@ -246,7 +247,7 @@ PRESETS = st.builds(
     pyramid=st.builds(
         PyramidSettings,
         merge_distance_m=st.floats(min_value=0, exclude_min=True),
-        seed=st.integers(0, 2**32 - 1),
+        seed=seeds,
         robot_radius_m=st.floats(min_value=0, allow_infinity=False),
     ),
     planner=st.builds(

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -17,8 +16,8 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import cost_along
 from tests._base.test_poses import path_of
 from tests.layers import grid_of, layer_of
-from tests.planning.test_costs import optimum_m, scene, seeds, topology_of
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.planning.test_costs import optimum_m, scene, topology_of
+from tests.strategies import class_grids, occupancy_grid, seeds, tried
 
 OFFICE = Path(__file__).parents[2] / "maps" / "office" / "office.yaml"
 
@@ -73,8 +72,7 @@ def check(grid: hn.OccupancyGrid, is_open: Any, path: hn.Path, radius_m: float) 
         assert is_open[tuple(cells.T)].all()
 
 
-@given(class_grids(max_side=24), seeds, st.booleans(), st.sampled_from([0.1, 0.5, 2.0]))
-@settings(max_examples=examples(100), deadline=None)
+@tried(100, class_grids(max_side=24), seeds, st.booleans(), st.sampled_from([0.1, 0.5, 2.0]))
 def test_arcs_stay_in_free_space_and_near_the_cost_of_the_line(classes, seed, off_centre, radius_m):
     grid, layer, is_open, start, goal, rng = scene(classes, seed)
     preset = hn.load_preset("grid-astar", overrides=[f"planner.turning_radius_m={radius_m}"])

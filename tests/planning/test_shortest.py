@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -19,9 +19,8 @@ from hybridnav.planning.methods import shortest as methods_shortest
 from hybridnav.planning.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
 from tests.oracle.any_angle import some_positions
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, occupancy_grid, seeds, tried
 
-seeds = st.integers(0, 2**32 - 1)
 FRAMES = (hn.Frame(1.0), hn.Frame(0.05, (12.3, -400.0), 0.7), hn.Frame(0.1, (5e5, 4e6), -2.0))
 
 
@@ -51,8 +50,7 @@ def assert_optimal(grid: hn.OccupancyGrid, result: hn.PlanResult, optimum_m: flo
     assert len(result.route.arcs) == len(result.route.places) - 1
 
 
-@settings(max_examples=examples(50), deadline=None)
-@given(class_grids(max_side=14), seeds, st.sampled_from(FRAMES))
+@tried(50, class_grids(max_side=14), seeds, st.sampled_from(FRAMES))
 def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn.Frame) -> None:
     free = classes == hn.CellClass.FREE
     assume(free.any())
@@ -69,8 +67,7 @@ def test_paths_are_optimal_between_any_points(classes: Any, seed: int, frame: hn
             assert result.path.cells[[0, -1]].tolist() == [list(first), list(last)]
 
 
-@settings(max_examples=examples(50), deadline=None)
-@given(class_grids(max_side=14), seeds, st.booleans())
+@tried(50, class_grids(max_side=14), seeds, st.booleans())
 def test_paths_round_closed_cells_are_optimal(classes, seed, is_prepared):
     cells = np.argwhere(classes == hn.CellClass.FREE)
     assume(len(cells) > 4)
@@ -161,8 +158,7 @@ def test_smoothing_changes_nothing() -> None:
     assert {result.metric for result in results} == {"any-angle"}
 
 
-@settings(max_examples=examples(30), deadline=None)
-@given(class_grids(max_side=14), seeds, st.sampled_from([0.0, 0.01, 0.3]))
+@tried(30, class_grids(max_side=14), seeds, st.sampled_from([0.0, 0.01, 0.3]))
 def test_a_path_is_as_near_the_optimum_as_it_was_asked_to_be(classes, seed, epsilon):
     cells = np.argwhere(classes == hn.CellClass.FREE)
     assume(len(cells))

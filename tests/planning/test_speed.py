@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import sparse
 from scipy.optimize import linprog
@@ -19,7 +18,7 @@ import hybridnav as hn
 from hybridnav.planning import LimitSettings, MotionLimits, SpeedMap, load_preset
 from tests._base.test_poses import curve_path, path_of, turned
 from tests.plans import TWO_ROOMS, grid_of, map_of
-from tests.strategies import examples
+from tests.strategies import tried
 
 LIMIT = st.floats(0.2, 3.0).map(lambda x: round(x, 2))
 LIMITS = st.builds(MotionLimits, LIMIT, LIMIT, LIMIT, LIMIT, LIMIT, LIMIT)
@@ -96,8 +95,7 @@ def spot_seconds(angle_rad: float, limits: MotionLimits) -> float:
     return 2 * seconds
 
 
-@given(pieces=PIECES, limits=LIMITS)
-@settings(max_examples=examples(40), deadline=None)
+@tried(40, pieces=PIECES, limits=LIMITS)
 def test_no_linear_program_finds_a_faster_profile(pieces: Any, limits: MotionLimits) -> None:
     path = tangent_path(pieces)
     profile = path.profile(limits, 0.05)
@@ -114,8 +112,7 @@ def test_no_linear_program_finds_a_faster_profile(pieces: Any, limits: MotionLim
     assert profile.duration_s == pytest.approx(seconds, rel=2e-3, abs=0.02)
 
 
-@given(pieces=PIECES, limits=LIMITS, spacing_m=st.floats(0.03, 2.0))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, pieces=PIECES, limits=LIMITS, spacing_m=st.floats(0.03, 2.0))
 def test_no_limit_is_violated_and_the_spacing_changes_no_time(pieces, limits, spacing_m):
     path = tangent_path(pieces)
     profile = path.profile(limits, spacing_m)
@@ -148,8 +145,7 @@ def test_no_limit_is_violated_and_the_spacing_changes_no_time(pieces, limits, sp
     assert profile.duration_s == pytest.approx(path.profile(limits, 0.011).duration_s)
 
 
-@given(pieces=PIECES, limits=LIMITS, more=st.floats(1.0, 3.0))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, pieces=PIECES, limits=LIMITS, more=st.floats(1.0, 3.0))
 def test_higher_limits_are_never_slower_and_time_scales(pieces, limits, more):
     path = tangent_path(pieces)
     seconds = path.profile(limits).duration_s
@@ -165,8 +161,7 @@ def test_higher_limits_are_never_slower_and_time_scales(pieces, limits, more):
     assert path.profile(MotionLimits(**film)).duration_s == pytest.approx(seconds / 2)
 
 
-@given(pieces=PIECES, limits=LIMITS)
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, pieces=PIECES, limits=LIMITS)
 def test_backwards_along_the_same_way_takes_as_long(pieces: Any, limits: MotionLimits) -> None:
     path = tangent_path(pieces)
     assert path.headings_rad is not None
@@ -234,8 +229,7 @@ def test_the_robot_stops_where_it_reverses(goal: Any) -> None:
 # Zones.
 
 
-@given(data=st.data())
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, data=st.data())
 def test_zones_slow_down_whatever_touches_them(data: Any) -> None:
     cells = data.draw(st.lists(st.sampled_from([0.1, 0.4, math.inf]), min_size=12, max_size=12))
     limits = np.array(cells).reshape(3, 4)
@@ -309,14 +303,14 @@ def check_length(path: hn.Path) -> None:
         assert lacking <= path.length_m * (spacing_m * bent) ** 2 / 24 + 1e-9
 
 
-@given(pieces=PIECES)
-@settings(max_examples=examples(30), deadline=None)
+@tried(30, pieces=PIECES)
 def test_the_length_is_that_of_lines_and_arcs(pieces: Any) -> None:
     check_length(tangent_path(pieces))
 
 
-@given(goal=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3)), reverses=st.booleans())
-@settings(max_examples=examples(30), deadline=None)
+@tried(
+    30, goal=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3)), reverses=st.booleans()
+)
 def test_the_length_is_that_of_turning_circles(goal: Any, *, reverses: bool) -> None:
     if math.hypot(*goal[:2]) > 0.1:
         path = curve_path((0.0, 0.0, 0.0), goal, 0.8, reverses=reverses)

@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError
 from tests.planning.test_costs import topology_of
-from tests.strategies import class_grids, examples
+from tests.strategies import class_grids, seeds, tried
 
 _CORNERS = np.array([[0, 0], [0, 1], [1, 1], [1, 0]])
 PRESETS = ("shortest", "octile", "grid-astar", "robot", "paper")
@@ -31,13 +30,13 @@ def reached(is_open: Any, start: tuple[int, int]) -> list[tuple[int, int]]:
     return sorted(found)
 
 
-@given(
+@tried(
+    80,
     class_grids(max_side=12),
     st.sampled_from(PRESETS),
-    st.integers(0, 2**32 - 1),
+    seeds,
     st.sampled_from([0.0, 0.3, 1.0, 40.0]),
 )
-@settings(max_examples=examples(80), deadline=None)
 def test_the_path_ends_at_the_nearest_point_of_the_free_space_that_is_reached(
     classes: Any, preset: str, seed: int, within: float
 ) -> None:

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from numba.core.registry import CPUDispatcher
 from shapely import box
 
@@ -26,7 +25,7 @@ from hybridnav.ext.live import OnlinePyramid, OnlineRooms
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.planning import PlanBatch
 from hybridnav.search.grid_search import GridSearch
-from tests.strategies import Scene, examples, scenes
+from tests.strategies import Scene, scenes, tried
 
 FIGURE1 = Path(__file__).parents[2] / "maps" / "figure1" / "figure1.yaml"
 
@@ -259,8 +258,7 @@ def test_a_result_is_read_where_there_is_no_map(tmp_path: Path) -> None:
     assert run.stdout.split() == [str(result.cost), *map(str, result.route.places)]
 
 
-@given(scene=scenes())
-@settings(max_examples=examples(25), deadline=None)
+@tried(25, scene=scenes())
 def test_a_copied_search_finds_the_same_paths(scene: Scene) -> None:
     enterable = scene.grid.enterable()
     free = np.argwhere(enterable)

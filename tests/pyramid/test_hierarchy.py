@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from numba.core.registry import CPUDispatcher
 
 import hybridnav as hn
@@ -21,7 +20,7 @@ from hybridnav.pyramid.kernels.fields import level_sizes
 from tests.oracle.checks import base_darts, protected_of, sigma_of
 from tests.oracle.inclusion import nested_scenes
 from tests.oracle.reference import PlaneMap
-from tests.strategies import IS_FULL, MAX_SIDE, drawn, examples, occupancy_grid
+from tests.strategies import IS_FULL, MAX_SIDE, drawn, examples, occupancy_grid, seeds
 
 LINKAGES = ("radius", "survivor", "diameter")
 SIDE = min(24 if IS_FULL else 20, MAX_SIDE)
@@ -132,7 +131,7 @@ def test_kernels_applied_edge_by_edge_give_every_level(scene, linkage):
     check_replay(built(scene, linkage), scene.classes)
 
 
-@given(scene=nested_scenes(min(14, SIDE)), seed=st.integers(0, 2**32 - 1))
+@given(scene=nested_scenes(min(14, SIDE)), seed=seeds)
 @settings(ORDINARY, max_examples=examples(30))
 def test_levels_do_not_depend_on_the_order_they_are_asked_for(scene, seed):
     pyramid, other = built(scene, "radius"), built(scene, "radius")

@@ -66,9 +66,7 @@ def parts_of(cells: Any) -> int:
 
 @given(made=grown(max_side=min(MAX_SIDE, 24)))
 @SOME
-def test_every_level_above_the_places_is_the_plane_map_of_its_fields(
-    made: tuple[Scene, hn.DualGraphPyramid],
-) -> None:
+def test_every_level_above_the_places_is_the_plane_map_of_its_fields(made):
     scene, pyramid = made
     base = Base.of(scene.classes)
     for level in above(pyramid):
@@ -82,9 +80,7 @@ def test_every_level_above_the_places_is_the_plane_map_of_its_fields(
 
 @given(made=grown(max_side=min(MAX_SIDE, 24)))
 @SOME
-def test_the_length_of_a_boundary_is_the_number_of_its_cracks(
-    made: tuple[Scene, hn.DualGraphPyramid],
-) -> None:
+def test_the_length_of_a_boundary_is_the_number_of_its_cracks(made):
     for level in above(made[1]):
         assert level.n_cracks.tolist() == [len(level.boundary(arc)) for arc in range(level.n_arcs)]
         between = int(level.n_cracks[~level.is_self_loop].sum())
@@ -95,9 +91,7 @@ def test_the_length_of_a_boundary_is_the_number_of_its_cracks(
 
 @given(made=grown())
 @SOME
-def test_up_to_the_places_the_levels_are_those_of_the_pyramid_below(
-    made: tuple[Scene, hn.DualGraphPyramid],
-) -> None:
+def test_up_to_the_places_the_levels_are_those_of_the_pyramid_below(made):
     scene, pyramid = made
     plain = scene.pyramid(pyramid.linkage)
     assert pyramid.place_level == plain.place_level
@@ -110,9 +104,7 @@ def test_up_to_the_places_the_levels_are_those_of_the_pyramid_below(
 
 @given(scene=scenes(), linkage=st.sampled_from(LINKAGES))
 @SOME
-def test_the_darts_of_the_places_are_those_that_the_record_describes(
-    scene: Scene, linkage: Any
-) -> None:
+def test_the_darts_of_the_places_are_those_that_the_record_describes(scene, linkage):
     pyramid = scene.pyramid(linkage)
     made, level = pyramid[-1].darts, pyramid[-1]
     again = type(level)(level.grid, pyramid.record, level.index, LazyIslands(level.grid)).darts
@@ -125,9 +117,7 @@ def test_the_darts_of_the_places_are_those_that_the_record_describes(
 
 @given(made=grown())
 @SOME
-def test_regions_keep_their_size_and_could_not_grow(
-    made: tuple[Scene, hn.DualGraphPyramid],
-) -> None:
+def test_regions_keep_their_size_and_could_not_grow(made):
     pyramid = made[1]
     most, places, regions = pyramid.region_cells, above(pyramid)[0], pyramid[pyramid.region_level]
     assert most is not None
@@ -138,9 +128,7 @@ def test_regions_keep_their_size_and_could_not_grow(
 
 @given(made=grown())
 @SOME
-def test_the_apex_has_one_vertex_for_each_connected_set_of_a_class(
-    made: tuple[Scene, hn.DualGraphPyramid],
-) -> None:
+def test_the_apex_has_one_vertex_for_each_connected_set_of_a_class(made):
     scene, pyramid = made
     assert pyramid[-1].n_vertices == parts_of(scene.classes)
     assert not len(mergeable(pyramid[-1]))
@@ -148,9 +136,7 @@ def test_the_apex_has_one_vertex_for_each_connected_set_of_a_class(
 
 @given(made=grown(max_side=min(MAX_SIDE, 16)))
 @SOME
-def test_no_arc_is_contracted_beside_one_rated_more_than_twice_as_high(
-    made: tuple[Scene, hn.DualGraphPyramid],
-) -> None:
+def test_no_arc_is_contracted_beside_one_rated_more_than_twice_as_high(made):
     pyramid = made[1]
     for level in above(pyramid)[:-1]:
         most = pyramid.region_cells if level.index < pyramid.region_level else np.inf
@@ -166,9 +152,7 @@ def test_no_arc_is_contracted_beside_one_rated_more_than_twice_as_high(
 
 @given(scene=labelled(), distance_m=st.sampled_from([1.5, 4.0]))
 @SOME
-def test_with_rooms_regions_lie_inside_rooms_and_the_rooms_come_above_them(
-    scene: Any, distance_m: float
-) -> None:
+def test_with_rooms_regions_lie_inside_rooms_and_the_rooms_come_above_them(scene, distance_m):
     classes, rooms = scene
     labels = rooms.label_of
     grid = occupancy_grid(classes)

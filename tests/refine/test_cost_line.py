@@ -5,15 +5,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from scipy import ndimage
 
 from hybridnav.refine import CostLine
 from hybridnav.search.lattice import LatticeSearch, build_lattice
 from tests.layers import grid_of, layer_of
 from tests.oracle.any_angle_cost import SidePoints
-from tests.search.lattice.scenes import SEEDS, Field, fields, settled
-from tests.strategies import MAX_SIDE, drawn, examples
+from tests.search.lattice.scenes import Field, fields, settled
+from tests.strategies import MAX_SIDE, drawn, seeds, tried
 
 SLACK = 1e-12
 """Rounding of sums of costs, relative."""
@@ -40,24 +39,19 @@ def lattice_lines(field: Field, rng: np.random.Generator, count: int) -> list[An
     return [line for line in found if line is not None and (line[0] != line[-1]).any()]
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(150), deadline=None)
+@tried(150, fields(MAX_SIDE), seeds)
 def test_it_is_legal_and_never_dearer(field: Field, seed: int) -> None:
     for line in lattice_lines(field, np.random.default_rng(seed), 6):
         check(field, line)
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(60), deadline=None)
-def test_a_line_that_settled_stays_legal_and_no_dearer_when_it_settles_again(
-    field: Field, seed: int
-) -> None:
+@tried(60, fields(MAX_SIDE), seeds)
+def test_a_line_that_settled_stays_legal_and_no_dearer_when_it_settles_again(field, seed):
     for line in lattice_lines(field, np.random.default_rng(seed), 3):
         check(field, check(field, line))
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, fields(MAX_SIDE), seeds)
 def test_lines_that_wander_and_return_to_a_place(field: Field, seed: int) -> None:
     """Out and back, so that the ends may be the same, over cells in any order."""
     rng = np.random.default_rng(seed)
@@ -70,8 +64,7 @@ def test_lines_that_wander_and_return_to_a_place(field: Field, seed: int) -> Non
             check(field, back)
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, fields(MAX_SIDE), seeds)
 def test_lines_that_graze_obstacles_where_all_costs_are_alike(field: Field, seed: int) -> None:
     """From corner to corner of blocked cells, and along their sides."""
     plain = Field(field.free, np.ones(field.free.shape, np.float32))
@@ -147,8 +140,7 @@ def test_ends_on_sides_and_corners_stay_where_they_are() -> None:
                 check(field, line)
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, fields(MAX_SIDE), seeds)
 def test_paths_of_cells_become_no_dearer(field: Field, seed: int) -> None:
     """By `shorten`, which takes cells, and points in metres."""
     rng = np.random.default_rng(seed)
@@ -210,8 +202,7 @@ def test_it_is_near_the_cheapest_where_costs_are_smooth() -> None:
     assert loss.max() <= 0.015
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, fields(MAX_SIDE), seeds)
 def test_arcs_cost_at_most_a_two_hundredth_more(field: Field, seed: int) -> None:
     grid = grid_of(1.0 - field.free, robot_radius_m=0)
     finish = CostLine(grid, layer_of(field.factors))

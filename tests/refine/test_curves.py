@@ -28,11 +28,7 @@ both = pytest.mark.parametrize("reverses", [False, True])
 @both
 @given(start=poses, goal=poses)
 @settings(max_examples=examples(125), derandomize=True)
-def test_curve_arrives_and_bends_by_its_radius(
-    reverses: bool,
-    start: Any,
-    goal: Any,
-) -> None:
+def test_curve_arrives_and_bends_by_its_radius(reverses, start, goal):
     curve = shortest_curve(start, goal, radius_m=RADIUS_M, reverses=reverses)
     along = curve.poses(0.01)
     np.testing.assert_array_equal(along[0], start)
@@ -52,11 +48,7 @@ def test_curve_arrives_and_bends_by_its_radius(
 @both
 @given(start=poses, goal=poses)
 @settings(max_examples=examples(125), derandomize=True)
-def test_curve_is_as_long_as_that_of_ompl(
-    reverses: bool,
-    start: Any,
-    goal: Any,
-) -> None:
+def test_curve_is_as_long_as_that_of_ompl(reverses, start, goal):
     base = pytest.importorskip("ompl.base")
     space = (base.ReedsSheppStateSpace if reverses else base.DubinsStateSpace)(RADIUS_M)
     states = [space.allocState(), space.allocState()]

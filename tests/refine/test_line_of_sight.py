@@ -21,9 +21,17 @@ from hybridnav.refine.kernels.line_of_sight import clear_segments
 from hybridnav.refine.kernels.taut import FREE
 from hybridnav.search.grid_search import GridSearch
 from tests.oracle.grid import length_of_points
-from tests.strategies import MAX_SIDE, class_grids, drawn, examples, framed, occupancy_grid
+from tests.strategies import (
+    MAX_SIDE,
+    class_grids,
+    drawn,
+    examples,
+    framed,
+    occupancy_grid,
+    seeds,
+    tried,
+)
 
-seeds = st.integers(0, 2**32 - 1)
 yaws = st.sampled_from([0.0, 0.7, -2.5])
 
 
@@ -122,9 +130,7 @@ def test_inner_points_are_blocked_corners_that_cannot_be_left_out(classes: Any, 
 @given(class_grids(max_side=16), seeds, yaws)
 @settings(max_examples=examples(150), derandomize=True)
 @example(drawn("......", ".####.", ".#....", ".#.##.", "...#.."), 3, 0.0)
-def test_path_is_the_optimum_where_no_obstacle_can_be_passed_on_two_sides(
-    classes: Any, seed: int, yaw_rad: float
-) -> None:
+def test_path_is_the_optimum_where_no_obstacle_can_be_passed_on_two_sides(classes, seed, yaw_rad):
     rng = np.random.default_rng(seed)
     grid = framed(without_islands(classes), yaw_rad)
     finish, graph = LineOfSight(grid), VisibilityGraph(grid)
@@ -264,10 +270,7 @@ coordinates = st.one_of(
 )
 
 
-@given(
-    st.lists(coordinates, min_size=4, max_size=4), st.integers(0, 2**32 - 1), st.floats(0.1, 3.0)
-)
-@settings(max_examples=examples(300), deadline=None)
+@tried(300, st.lists(coordinates, min_size=4, max_size=4), seeds, st.floats(0.1, 3.0))
 def test_one_walk_finds_what_two_do(ends: Any, seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
     free = (rng.random((SIDE, SIDE)) < 0.9).astype(np.uint8)

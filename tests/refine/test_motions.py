@@ -15,9 +15,8 @@ from hybridnav.refine import MotionCheck
 from hybridnav.refine.curves import shortest_curve
 from hybridnav.refine.footprint import Footprint
 from tests.oracle.motions import ShapelyRobot, turning_poses
-from tests.strategies import class_grids, drawn, examples, framed
+from tests.strategies import class_grids, drawn, examples, framed, seeds
 
-seeds = st.integers(0, 2**32 - 1)
 yaws = st.sampled_from([0.0, 0.7, -2.5])
 
 
@@ -32,9 +31,7 @@ def segments_of(grid: OccupancyGrid, rng: np.random.Generator, n: int) -> list[A
 
 @given(class_grids(max_side=16), seeds, yaws)
 @settings(max_examples=examples(80), derandomize=True)
-def test_straight_motions_of_a_disc_are_those_that_the_judge_passes(
-    classes: Any, seed: int, yaw_rad: float
-) -> None:
+def test_straight_motions_of_a_disc_are_those_that_the_judge_passes(classes, seed, yaw_rad):
     grid = framed(classes, yaw_rad)
     allow_unexplored = bool(seed % 2)
     check = MotionCheck(grid, allow_unexplored=allow_unexplored)

@@ -114,9 +114,7 @@ def test_trouble_before_a_path_costs_the_time_at_most_and_the_grid_takes_over(
 
 
 @pytest.mark.parametrize("trouble", list(REASONS))
-def test_what_was_found_before_the_trouble_counts(
-    planner: hn.HybridPlanner, troubled: Callable[..., None], trouble: str
-) -> None:
+def test_what_was_found_before_the_trouble_counts(planner, troubled, trouble):
     troubled(trouble, after_path=True)
     result = planner.plan(*ENDS)
     assert result.status is hn.PlanStatus.SOLVED
@@ -138,9 +136,7 @@ def test_what_was_found_before_the_trouble_counts(
         ("PRMstar", "mask"),
     ],
 )
-def test_planners_that_go_on_keep_to_their_time(
-    planner: hn.HybridPlanner, planner_name: str, confine: str
-) -> None:
+def test_planners_that_go_on_keep_to_their_time(planner, planner_name, confine):
     settings = f"{{planner: {planner_name}, confine: {confine}, budget_s: {BUDGET_S}}}"
     preset = load_preset("ompl", overrides=[f"planner.ompl={settings}"])
     made = hn.HybridPlanner(planner.topology, preset=preset)
@@ -173,9 +169,7 @@ def test_a_worker_that_dies_is_started_beside_the_queries(planner: hn.HybridPlan
     assert max(spent) <= 2 * BUDGET_S
 
 
-def test_a_fork_does_not_outlive_its_worker(
-    planner: hn.HybridPlanner, troubled: Callable[..., None]
-) -> None:
+def test_a_fork_does_not_outlive_its_worker(planner, troubled):
     troubled("hang")
     worker = worker_of(planner)
     results: list[hn.PlanResult] = []
@@ -279,9 +273,7 @@ def test_queries_of_two_threads_do_not_mix(planner: hn.HybridPlanner) -> None:
         np.testing.assert_allclose(reached, endpoints, atol=1e-9)
 
 
-def test_a_fork_has_a_worker_of_its_own_and_leaves_that_of_its_parent(
-    planner: hn.HybridPlanner,
-) -> None:
+def test_a_fork_has_a_worker_of_its_own_and_leaves_that_of_its_parent(planner):
     before = worker_of(planner)._running.process.pid
     child = os.fork()
     if child == 0:
@@ -330,9 +322,7 @@ def test_files_of_the_working_directory_are_not_taken_for_modules(tmp_path: Path
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(
-    planner: hn.HybridPlanner, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_fails_at_a_new_start_is_said_and_the_grid_takes_over(planner, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr("sys.executable", "/nowhere/python")
         worker_of(planner)._running.process.kill()

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.refine import LineOfSight
@@ -16,10 +15,10 @@ from hybridnav.search.directed import DirectedSides
 from hybridnav.search.found import ClosedCells
 from hybridnav.search.grid_search import GridSearch
 from tests.closures.test_one_way import STEPS, forbidden_by
-from tests.strategies import examples
+from tests.strategies import examples, seeds
 
 PLAIN = settings(max_examples=examples(60), deadline=None, derandomize=True)
-SEED = st.integers(0, 2**32 - 1)
+SEED = seeds
 SHAPE = 9, 11
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -15,7 +14,7 @@ from hybridnav.rooms.files.paint import without_slivers
 from hybridnav.viz import plot_rooms
 from tests.drawn_rooms import write_ros
 from tests.rooms.test_room_level import named
-from tests.strategies import drawn, examples, labelled, occupancy_grid
+from tests.strategies import drawn, labelled, occupancy_grid, tried
 
 # A closet with a door of one cell beside a hall with a door of three and a pillar in the lab's.
 FLAT = drawn(
@@ -87,8 +86,8 @@ def oracle(measured, label_of):
     return list(classes.values())
 
 
-@settings(max_examples=examples(25))
-@given(
+@tried(
+    25,
     scene=labelled(),
     radius=st.sampled_from([1.0, 1.5, 2.3]),
     seed=st.integers(0, 3),
@@ -247,8 +246,7 @@ def test_a_number_never_goes_to_a_door_of_other_rooms(data, name, tmp_path):
     assert seen[1] == seen[3] == seen[5]
 
 
-@settings(max_examples=examples(15))
-@given(scene=labelled(), shift=st.integers(0, 50))
+@tried(15, scene=labelled(), shift=st.integers(0, 50))
 def test_numbers_that_are_known_survive_any_file(tmp_path_factory, scene, shift):
     classes, labels = scene
     grid = occupancy_grid(classes)

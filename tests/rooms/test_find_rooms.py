@@ -193,8 +193,7 @@ def test_a_hall_that_the_border_cuts_off_stays_a_room():
 
 
 @pytest.mark.parametrize(
-    ("name", "outside"),
-    [("bwi_gdc/3/3.yaml", True), ("nav2/maps/depot.yaml", False)],
+    ("name", "outside"), [("bwi_gdc/3/3.yaml", True), ("nav2/maps/depot.yaml", False)]
 )
 @pytest.mark.full
 @pytest.mark.filterwarnings("ignore::hybridnav.errors.MapWarning")

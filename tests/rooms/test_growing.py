@@ -13,13 +13,13 @@ from hybridnav.rooms.cutting import Ground, Kind, closed_by_disc, fine_segments,
 from hybridnav.rooms.merging import EVIDENCE, Forest, JudgedSegments, Likely, Small, merge
 from tests.rooms.growth import Growth, contract
 from tests.rooms.test_find_rooms import floor
-from tests.strategies import MAX_SIDE, class_grids, occupancy_grid
+from tests.strategies import MAX_SIDE, class_grids, occupancy_grid, seeds
 
 
 @st.composite
 def cut(draw):
     classes = draw(class_grids(min(MAX_SIDE, 16)))
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     free = classes == CellClass.FREE
     parts = rng.integers(0, draw(st.sampled_from([2, 9])), free.shape)
     rows, cols = np.indices(free.shape) // 4
@@ -215,7 +215,7 @@ def test_the_shipped_judge_keeps_a_door_and_joins_a_corridor():
         assert len(np.unique(segments.label_of[free])) == n_rooms
 
 
-@given(seed=st.integers(0, 2**32 - 1))
+@given(seed=seeds)
 def test_a_forest_adds_the_leaves_that_its_thresholds_lead_to(seed):
     rng = np.random.default_rng(seed)
     forest = Forest(
@@ -234,7 +234,7 @@ def test_a_forest_adds_the_leaves_that_its_thresholds_lead_to(seed):
         assert likely == pytest.approx(1 / (1 + np.exp(-odds)))
 
 
-@given(classes=class_grids(), seed=st.integers(0, 2**32 - 1))
+@given(classes=class_grids(), seed=seeds)
 def test_merged_segments_have_the_evidence_of_segments_that_were_never_apart(classes, seed):
     rng = np.random.default_rng(seed)
     free = classes == hn.CellClass.FREE

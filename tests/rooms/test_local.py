@@ -3,21 +3,15 @@
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
 
-@settings(max_examples=examples(60))
-@given(
-    st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.1, 0.25]), st.sampled_from([0.0, 0.7, -2.0])
-)
-def test_local_maps_laid_over_each_other_are_the_whole_map(
-    seed: int, radius_m: float, yaw_rad: float
-) -> None:
+@tried(60, seeds, st.sampled_from([0.0, 0.1, 0.25]), st.sampled_from([0.0, 0.7, -2.0]))
+def test_local_maps_laid_over_each_other_are_the_whole_map(seed, radius_m, yaw_rad):
     rng = np.random.default_rng(seed)
     chances = rng.choice(
         [0.0, 0.1, 0.4, 0.9, np.nan], p=[0.7, 0.1, 0.06, 0.08, 0.06], size=(17, 23)
@@ -46,8 +40,7 @@ def test_local_maps_laid_over_each_other_are_the_whole_map(
     assert covered[near & np.isfinite(grid.probability)].all()
 
 
-@settings(max_examples=examples(30))
-@given(st.integers(0, 2**32 - 1))
+@tried(30, seeds)
 def test_transforms_compose_to_the_identity_round_every_cycle(seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid = hn.OccupancyGrid(

@@ -5,7 +5,6 @@ from dataclasses import replace
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 from scipy.spatial.distance import cdist
@@ -16,16 +15,10 @@ from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.maps.files.ros import write_ros_map
 from hybridnav.viz import plot_rooms
 from tests.drawn_rooms import write_ros
-from tests.strategies import drawn, examples, labelled, occupancy_grid
+from tests.strategies import drawn, labelled, occupancy_grid, tried
 
 TWO_ROOMS = drawn(
-    "#########",
-    "#...#...#",
-    "#.......#",
-    "#...#...#",
-    "#...#...#",
-    "#.......#",
-    "#########",
+    "#########", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#.......#", "#########"
 )
 
 
@@ -56,8 +49,7 @@ def fields_of(level):
     }
 
 
-@settings(max_examples=examples(25))
-@given(scene=labelled(), merge_distance_m=st.sampled_from([1.5, 4.0, 30.0]))
+@tried(25, scene=labelled(), merge_distance_m=st.sampled_from([1.5, 4.0, 30.0]))
 def test_rooms_are_the_connected_parts_of_one_label_whatever_the_merge_distance(
     scene, merge_distance_m
 ):
@@ -76,8 +68,7 @@ def test_rooms_are_the_connected_parts_of_one_label_whatever_the_merge_distance(
         assert all(len(label) == 1 for label in labels)
 
 
-@settings(max_examples=examples(40))
-@given(scene=labelled(), linkage=st.sampled_from(["survivor", "radius", "diameter"]))
+@tried(40, scene=labelled(), linkage=st.sampled_from(["survivor", "radius", "diameter"]))
 def test_places_below_rooms_keep_the_cap_and_every_level_has_its_dual(scene, linkage):
     classes, rooms = scene
     pyramid = hn.DualGraphPyramid.build(
@@ -256,8 +247,7 @@ def test_doors_to_a_nameless_pocket_are_not_listed_and_those_to_a_nameless_hall_
             ask(999)
 
 
-@given(labelled(), st.sampled_from([0.0, 0.3, 0.8]), st.sampled_from([0.25, 0.5, 1.0]))
-@settings(max_examples=examples(120))
+@tried(120, labelled(), st.sampled_from([0.0, 0.3, 0.8]), st.sampled_from([0.25, 0.5, 1.0]))
 def test_what_is_listed_is_what_cells_counted_one_by_one_say(scene, radius_m, side_m):
     classes, labels = scene
     labels = RoomLabels(tuple(f"room-{n}" for n in range(len(labels.names))), labels.label_of)

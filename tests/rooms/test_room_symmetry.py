@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.rooms.cutting import Kind, without_noise
 from research._rooms_buildings import SITES, Building
 from tests.graphs.test_lane_symmetry import WAYS, offices, turned
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 SIDES = st.tuples(st.integers(0, 9), st.integers(0, 9))
 
@@ -39,14 +38,12 @@ def check_image(cells, side_m, way, margin):
     assert_same_rooms(found_rooms(cells, side_m), expected[top:-3, left:])
 
 
-@settings(max_examples=examples(12))
-@given(office=offices(), way=st.sampled_from(WAYS), margin=SIDES)
+@tried(12, office=offices(), way=st.sampled_from(WAYS), margin=SIDES)
 def test_offices_have_the_same_rooms_in_every_image(office, way, margin):
     check_image(office[0], 0.05, way, margin)
 
 
-@settings(max_examples=examples(60))
-@given(classes=class_grids(), way=st.sampled_from(WAYS), margin=SIDES)
+@tried(60, classes=class_grids(), way=st.sampled_from(WAYS), margin=SIDES)
 def test_any_cells_have_the_same_rooms_in_every_image(classes, way, margin):
     check_image(occupancy_grid(classes).probability, 0.25, way, margin)
 

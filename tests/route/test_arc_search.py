@@ -4,11 +4,10 @@ from typing import Any
 
 import networkx as nx
 import numpy as np
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybridnav.route.kernels import arcs as _kernels
-from tests.strategies import examples
+from tests.strategies import tried
 
 
 def arcs_out(n: int, arcs: list[tuple[int, int]]) -> tuple[Any, Any, Any]:
@@ -33,8 +32,7 @@ def multigraphs(draw: st.DrawFn) -> tuple[int, list[tuple[int, int]], list[int],
     return n, arcs, costs, ties
 
 
-@given(multigraphs(), st.data())
-@settings(max_examples=examples(300))
+@tried(300, multigraphs(), st.data())
 def test_cheapest_arcs_are_those_of_networkx_and_ties_go_by_the_second_cost(graph, data):
     n, arcs, costs, ties = graph
     start, goal = data.draw(st.integers(0, n - 1)), data.draw(st.integers(0, n - 1))

@@ -5,13 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
 from hybridnav.route import RouteFinder
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, occupancy_grid, seeds, tried
 
 CORNERS = drawn("......", ".##.#.", ".#.#..", "......")
 
@@ -49,8 +48,7 @@ def is_graze(arcs: list[int], steps: list[int], at: int) -> bool:
     return arcs[at] == arcs[at + 1] >= 0 and steps[at + 1] - steps[at] <= 10
 
 
-@given(class_grids(), st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, class_grids(), seeds)
 def test_a_route_is_the_walk_over_borders_without_its_grazes(classes: Any, seed: int) -> None:
     topology = hn.TopologicalMap(
         hn.DualGraphPyramid.build(occupancy_grid(classes), merge_distance_m=1.0)

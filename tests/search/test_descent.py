@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 from scipy import sparse
 from scipy.sparse import csgraph
@@ -27,7 +27,7 @@ from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.kernels import descent as kernels
 from hybridnav.search.lowest import lowest_of
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
-from tests.strategies import examples, free_cells, scenes
+from tests.strategies import free_cells, scenes, seeds, tried
 
 HOW = st.builds(
     DescentSettings,
@@ -43,8 +43,7 @@ def made(scene: Any, how: DescentSettings) -> tuple[Any, Descent]:
     return pyramid, Descent(pyramid, scene.classes == CellClass.FREE, how)
 
 
-@given(scenes(), HOW, st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(300))
+@tried(300, scenes(), HOW, seeds)
 def test_a_path_is_legal_and_there_whenever_one_is(scene: Any, how: Any, seed: int) -> None:
     enterable = scene.classes == CellClass.FREE
     cells = free_cells(scene.classes, seed, 6)
@@ -69,8 +68,7 @@ def test_a_path_is_legal_and_there_whenever_one_is(scene: Any, how: Any, seed: i
         assert math.isfinite(distances(inside, enterable.shape, start)[goal])
 
 
-@given(scenes(), HOW)
-@settings(max_examples=examples(150))
+@tried(150, scenes(), HOW)
 def test_the_levels_are_packed_as_the_pyramid_has_them(scene: Any, how: Any) -> None:
     pyramid = scene.pyramid("radius")
     enterable = scene.classes == CellClass.FREE
@@ -100,8 +98,7 @@ def test_the_levels_are_packed_as_the_pyramid_has_them(scene: Any, how: Any) -> 
         np.testing.assert_allclose(fields.middle[own], np.reshape(middles, (-1, 2)), atol=1e-4)
 
 
-@given(scenes(), st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(200))
+@tried(200, scenes(), seeds)
 def test_the_route_of_places_is_the_cheapest_by_max_distance(scene: Any, seed: int) -> None:
     cells = free_cells(scene.classes, seed, 2)
     assume(cells)
@@ -167,8 +164,7 @@ def test_long_routes_are_found_part_by_part() -> None:
     assert longest > 100
 
 
-@given(scenes(), st.sampled_from([1, 4, 9]), st.sampled_from(["small", "many", "few"]))
-@settings(max_examples=examples(150))
+@tried(150, scenes(), st.sampled_from([1, 4, 9]), st.sampled_from(["small", "many", "few"]))
 def test_fields_above_are_what_arcs_connect_inside_a_block(scene, field_cells, kind):
     pyramid, enterable = scene.pyramid("radius"), scene.classes == CellClass.FREE
     how = DescentSettings(field_cells=field_cells)
@@ -222,8 +218,7 @@ def test_small_places_are_planned_from_blocks_above_them() -> None:
     assert found.expanded_fields <= 64  # of 3,600 places
 
 
-@given(scenes(), HOW, st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(100))
+@tried(100, scenes(), HOW, seeds)
 def test_a_watched_descent_narrows_to_its_path(scene: Any, how: Any, seed: int) -> None:
     cells = free_cells(scene.classes, seed, 2)
     assume(cells)

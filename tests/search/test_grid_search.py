@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
-from scipy import sparse
 
 import hybridnav as hn
 from hybridnav._base.moves import octile_distance_in_cells, path_length_in_cells
@@ -20,27 +19,18 @@ from hybridnav.maps import CellClass
 from hybridnav.maps.files.movingai import Scenario, load_scenarios
 from hybridnav.search.grid_search import GridSearch, cheapest_waypoints
 from hybridnav.search.kernels import grid_search as kernels
-from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
-from tests.strategies import class_grids, drawn, examples
+from tests.oracle.grid import (
+    assert_legal,
+    counted,
+    distances,
+    move_graph,
+    moves,
+    recounted,
+    weighted,
+)
+from tests.strategies import class_grids, drawn, seeds, tried
 
-seeds = st.integers(0, 2**32 - 1)
 ONE = 1 << 14
-
-
-def weighted(graph: Any, factors: Any) -> Any:
-    """The graph of moves with lengths times the mean factors of their cells, as floats."""
-    entries = graph.tocoo()
-    tails, heads = entries.coords
-    flat = factors.ravel()
-    weights = entries.data * (flat[tails] + flat[heads]) / 2
-    return sparse.coo_array((weights, (tails, heads)), shape=graph.shape).tocsr()
-
-
-def counted(cells: Any, factors: Any) -> float:
-    """Cost of a path of cells, counted move by move."""
-    along = factors[cells[:, 0], cells[:, 1]]
-    lengths = np.hypot(*np.diff(cells, axis=0).T)
-    return float((lengths * (along[1:] + along[:-1]) / 2).sum())
 
 
 def random_units(shape: tuple[int, int], rng: np.random.Generator) -> Any:
@@ -58,8 +48,7 @@ def random_units(shape: tuple[int, int], rng: np.random.Generator) -> Any:
     return rng.choice(np.array([2 * ONE, 2 * ONE + 1, 5 * ONE], np.int32), shape)
 
 
-@given(class_grids(max_side=24), seeds)
-@settings(max_examples=examples(200))
+@tried(200, class_grids(max_side=24), seeds)
 def test_the_path_is_the_cheapest(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     enterable = classes == CellClass.FREE
@@ -83,8 +72,7 @@ def test_the_path_is_the_cheapest(classes: Any, seed: int) -> None:
             assert cost >= octile_distance_in_cells(start, goal) * (1 - 1e-12)
 
 
-@given(class_grids(max_side=16), seeds)
-@settings(max_examples=examples(100))
+@tried(100, class_grids(max_side=16), seeds)
 def test_a_corridor_and_closed_cells_are_kept(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     enterable = classes == CellClass.FREE
@@ -165,7 +153,7 @@ def test_a_full_bucket_starts_the_search_anew_with_more_room() -> None:
     assert (first == second).all()
 
 
-@given(classes=class_grids(9), seed=st.integers(0, 2**32 - 1), n_sets=st.integers(2, 4))
+@given(classes=class_grids(9), seed=seeds, n_sets=st.integers(2, 4))
 def test_stops_are_as_cheap_as_the_best_of_all_choices(classes, seed, n_sets):
     enterable = classes == CellClass.FREE
     cells = np.flatnonzero(enterable)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -23,13 +23,11 @@ from hybridnav.maps import CellClass
 from hybridnav.search.grid_search import GridSearch, move_tables
 from hybridnav.search.kernels import grid_search as _astar_kernels
 from tests.oracle.grid import assert_legal, distances, move_graph, moves, recounted
-from tests.strategies import block_labels, class_grids, drawn, examples
+from tests.strategies import block_labels, class_grids, drawn, seeds, tried
 
 Bools = NDArray[np.bool_]
 Cells = NDArray[np.int64]
 Labels = NDArray[np.int32]
-
-seeds = st.integers(0, 2**32 - 1)
 
 
 def random_cell(inside: Bools, rng: np.random.Generator) -> tuple[int, int]:
@@ -76,8 +74,7 @@ def cost_of(cells: Any) -> int:
     return straight * STRAIGHT + diagonal * DIAGONAL
 
 
-@given(seeds, st.sampled_from([0.0, 0.1, 0.25, 0.4]))
-@settings(max_examples=examples(30))
+@tried(30, seeds, st.sampled_from([0.0, 0.1, 0.25, 0.4]))
 def test_one_object_serves_many_searches(seed: int, density: float) -> None:
     rng = np.random.default_rng(seed)
     enterable = rng.random((11, 12)) >= density
@@ -168,8 +165,7 @@ def inside_of(enterable: Bools, corridor: tuple[Labels, Bools] | None) -> Bools:
     return enterable if corridor is None else enterable & corridor[1][corridor[0]]
 
 
-@given(cases())
-@settings(max_examples=examples(500))
+@tried(500, cases())
 def test_in_any_corridor_and_with_cut_corners_the_path_is_a_shortest_one(case):
     enterable, corner_cutting, corridor, rng = case
     inside = inside_of(enterable, corridor)
@@ -209,8 +205,7 @@ def test_only_paths_below_the_limit_are_found(case):
                 assert cost_of(found.cells) == optimum
 
 
-@given(cases(), st.sampled_from([1, 3, 20]))
-@settings(max_examples=examples(200))
+@tried(200, cases(), st.sampled_from([1, 3, 20]))
 def test_blocked_cells_are_as_on_a_grid_without_them_and_only_for_one_search(case, n_blocked):
     enterable, corner_cutting, corridor, rng = case
     inside = inside_of(enterable, corridor)

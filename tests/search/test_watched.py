@@ -5,17 +5,14 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import CellClass
 from hybridnav.search.grid_search import GridSearch
 from hybridnav.search.octile import JumpSearch, build_jump_graph, contract_graph
 from tests.oracle.grid import assert_legal, distances, move_graph
-from tests.strategies import class_grids, examples
-
-seeds = st.integers(0, 2**32 - 1)
+from tests.strategies import class_grids, seeds, tried
 
 
 def octile(cells, end):
@@ -40,8 +37,7 @@ def check_parents(record):
     assert (np.diff(record.f) >= 0).all()
 
 
-@given(classes=class_grids(), seed=seeds)
-@settings(max_examples=examples(60))
+@tried(60, classes=class_grids(), seed=seeds)
 def test_astar_expands_what_any_astar_must_and_knows_its_cost(classes, seed):
     if not (np.asarray(classes) == CellClass.FREE).any():
         return
@@ -64,8 +60,7 @@ def test_astar_expands_what_any_astar_must_and_knows_its_cost(classes, seed):
 
 @pytest.mark.parametrize("contracted", [False, True])
 @example(np.array([[1, 0, 1, 1, 1, 1], [1, 1, 0, 1, 1, 1]], np.uint8), 0)  # corners, no arcs
-@given(classes=class_grids(), seed=seeds)
-@settings(max_examples=examples(40))
+@tried(40, classes=class_grids(), seed=seeds)
 def test_jumps_reach_corner_cells_by_ways_that_there_are(contracted, classes, seed):
     if not (np.asarray(classes) == CellClass.FREE).any():
         return

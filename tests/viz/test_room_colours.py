@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import ImageColor
 
@@ -14,7 +13,7 @@ from hybridnav.viz import plot_rooms, plot_rooms_beside, style
 from hybridnav.viz.room_colours import colour_rooms
 from research._rooms_buildings import SITES, Building
 from tests.drawn_rooms import HOUSE, topology_of
-from tests.strategies import examples, occupancy_grid
+from tests.strategies import occupancy_grid, seeds, tried
 
 MAPS = Path(__file__).parents[2] / "maps"
 
@@ -22,7 +21,7 @@ MAPS = Path(__file__).parents[2] / "maps"
 @st.composite
 def offices(draw):
     """Rooms between walls of 0.2 to 0.8 m, drawn as a person would, or any labels of cells."""
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     wall = draw(st.integers(0, 4))
     label_of = np.zeros((48, 64), dtype=np.int32)
     lines = label_of, label_of.T
@@ -63,8 +62,7 @@ def named(label_of, names=None):
     return RoomLabels(tuple(names), label_of)
 
 
-@settings(max_examples=examples(40))
-@given(label_of=offices())
+@tried(40, label_of=offices())
 def test_rooms_that_touch_or_share_a_wall_never_share_a_colour(label_of):
     grid = occupancy_grid(np.ones(label_of.shape, dtype=np.uint8), resolution_m=0.2)
     colours = colour_rooms(named(label_of), grid)
@@ -72,8 +70,7 @@ def test_rooms_that_touch_or_share_a_wall_never_share_a_colour(label_of):
     assert len(set(colours.tolist())) >= min(6, len(colours))
 
 
-@settings(max_examples=examples(20))
-@given(old=offices(), seed=st.integers(0, 99))
+@tried(20, old=offices(), seed=st.integers(0, 99))
 def test_a_name_has_one_colour_on_both_maps(old, seed):
     """The later map is cut a little differently: its rooms have moved by three cells."""
     grid = occupancy_grid(np.ones(old.shape, dtype=np.uint8), resolution_m=0.2)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -18,7 +18,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.viz import plot_level, plot_map, plot_places, plot_plan, save_figure, style
 from hybridnav.viz.layout import round_length, text_width, wrapped
 from hybridnav.viz.places import Places, colour_vertices
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 MAPS = Path(__file__).parents[2] / "maps"
 FREE, OCCUPIED, UNKNOWN = 0.0, 1.0, math.nan
@@ -104,8 +104,7 @@ def _title(ax):
     return ax.get_title().replace("\n", "  ·  ")
 
 
-@settings(max_examples=examples(40))
-@given(class_grids(), st.integers(0, 9))
+@tried(40, class_grids(), st.integers(0, 9))
 def test_neighbouring_places_have_different_colours_on_every_level(classes, index):
     pyramid = DualGraphPyramid.build(occupancy_grid(classes), merge_distance_m=3.0)
     level = pyramid[min(index, len(pyramid) - 1)]

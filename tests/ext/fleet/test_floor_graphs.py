@@ -6,7 +6,7 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -26,7 +26,7 @@ from hybridnav.ext.fleet import (
 from tests.drawn_rooms import topology_of
 from tests.ext.fleet.files.drawn_buildings import buildings
 from tests.ext.fleet.scenes import random_building
-from tests.strategies import examples
+from tests.strategies import tried
 
 COORDINATES = st.integers(-2000, 2000).map(lambda value: value / 100)
 POINTS = st.tuples(COORDINATES, COORDINATES)
@@ -51,8 +51,7 @@ def moved(points, pose):
     return turned[:, :2] + (x, y)
 
 
-@given(st.lists(POINTS, min_size=1, max_size=5), POSES)
-@settings(max_examples=examples(100))
+@tried(100, st.lists(POINTS, min_size=1, max_size=5), POSES)
 def test_a_floor_moves_with_all_that_lies_on_it(points, pose):
     own = FloorGraph(
         name="1",
@@ -71,10 +70,11 @@ def test_a_floor_moves_with_all_that_lies_on_it(points, pose):
         moved_floor(own, (0.0, math.nan, 0.0))
 
 
-@given(
-    st.lists(POINTS, min_size=2, max_size=4, unique=True), st.lists(POSES, min_size=1, max_size=3)
+@tried(
+    100,
+    st.lists(POINTS, min_size=2, max_size=4, unique=True),
+    st.lists(POSES, min_size=1, max_size=3),
 )
-@settings(max_examples=examples(100))
 def test_floors_of_one_building_fall_on_each_other_again(points, poses):
     """Floors whose lifts lie above each other, each drawn in a frame of its own."""
     assume(np.ptp(np.array(points), axis=0).max() > 0.5)
@@ -100,8 +100,7 @@ def test_floors_of_one_building_fall_on_each_other_again(points, poses):
         assert all(end.position_m == pytest.approx(at, abs=1e-6) for end in link.ends)
 
 
-@given(st.lists(st.tuples(POINTS, POINTS), min_size=3, max_size=6))
-@settings(max_examples=examples(100))
+@tried(100, st.lists(st.tuples(POINTS, POINTS), min_size=3, max_size=6))
 def test_what_does_not_fit_is_fitted_as_by_least_squares(pairs):
     low, high = (np.array(each) for each in zip(*pairs, strict=True))
     rough = np.column_stack([high - high.mean(axis=0), np.zeros(len(high))])
@@ -130,8 +129,7 @@ def test_one_link_shifts_a_floor_and_none_leaves_it():
     assert aligned.floor("2") is floors[2]
 
 
-@given(buildings())
-@settings(max_examples=examples(100))
+@tried(100, buildings())
 def test_links_join_floors_at_their_ends(building):
     joined = join_links(building)
     assert join_links(joined) is joined
@@ -188,8 +186,7 @@ def test_stairs_count_where_no_lift_leads_to_the_floor():
     assert alone.floor("1").graph.points.tolist() == [[7.0, -1.0]]
 
 
-@given(st.integers(0, 10**6))
-@settings(max_examples=examples(8), deadline=None)
+@tried(8, st.integers(0, 10**6))
 def test_nodes_of_a_layout_are_joined_exactly_where_the_building_has_a_route(
     tmp_path_factory, seed
 ):

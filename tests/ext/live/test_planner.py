@@ -7,17 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search.descent import Descent, DescentSettings
 from tests.interrupts import Struck, lines_of
 from tests.layers import layer_of
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
-SEEDS = st.integers(0, 2**32 - 1)
 KINDS = "plain", "unexplored", "costs", "corners", "windows off", "line of sight", "own places"
 
 
@@ -72,8 +69,7 @@ def told(result: hn.PlanResult) -> tuple[Any, ...]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@settings(max_examples=examples(25), deadline=None)
-@given(SEEDS)
+@tried(25, seeds)
 def test_plans_on_each_version_are_those_of_a_planner_made_anew(kind: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     values, radius_m = drawn(rng), float(rng.choice([0.0, 0.15]))
@@ -104,8 +100,7 @@ def test_plans_on_each_version_are_those_of_a_planner_made_anew(kind: str, seed:
             assert told(results[0]) == told(results[1])
 
 
-@settings(max_examples=examples(120), deadline=None)
-@given(SEEDS)
+@tried(120, seeds)
 def test_what_is_repaired_is_what_the_whole_pyramid_gives(seed: int) -> None:
     """All packed arrays, to the bit; small maps too often visit other levels after a change."""
     rng = np.random.default_rng(seed)

@@ -5,7 +5,6 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -14,7 +13,7 @@ from hybridnav.ext.live import OnlinePyramid, carry_costs
 from hybridnav.ext.live.state import PLACE, PlaceTable
 from hybridnav.ext.live.tiles import SIDE, Box, Tiles
 from tests.interrupts import Struck, lines_of, timer
-from tests.strategies import examples, occupancy_grid
+from tests.strategies import occupancy_grid, seeds, tried
 
 LOW = (-70, -130)
 SHAPE = (5 * SIDE + 9, 6 * SIDE + 3)
@@ -122,7 +121,7 @@ def grid_of(classes, south=0, west=0):
 @st.composite
 def changes(draw):
     """A map, the map later, grown on all sides, and where the first lies in it."""
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     rows, cols = draw(st.integers(1, 9)), draw(st.integers(1, 9))
     south, north, west, east = draw(st.tuples(*[st.integers(0, 3)] * 4))
     before = rng.choice(3, (rows, cols), p=[0.15, 0.75, 0.1])
@@ -132,8 +131,7 @@ def changes(draw):
     return grid_of(before), grid_of(after, south, west), inside, rng
 
 
-@settings(max_examples=examples(100), deadline=None)
-@given(changes())
+@tried(100, changes())
 def test_factors_and_closed_cells_stay_on_their_cells(case):
     before, after, inside, rng = case
     layer = hn.CostLayer(rng.integers(1, 9, before.shape), rng.random(before.shape) < 0.3)
@@ -147,8 +145,7 @@ def test_factors_and_closed_cells_stay_on_their_cells(case):
     assert carried.layer.source == layer.source
 
 
-@settings(max_examples=examples(100), deadline=None)
-@given(changes(), st.sampled_from([0.0, 0.7, 1.5]))
+@tried(100, changes(), st.sampled_from([0.0, 0.7, 1.5]))
 def test_clearance_is_that_of_the_newer_map_and_outdated_where_it_was_joined(case, radius_m):
     before, after, inside, rng = case
     clear = {"inflation_radius_m": radius_m, "multiplier": 3.0}

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.page.requests import Merge, Move, Rename, Split, changed, rings_of
-from tests.strategies import examples
+from tests.strategies import tried
 
 ROWS, COLS = 12, 18
 GRID = hn.OccupancyGrid(np.zeros((ROWS, COLS), np.float32), robot_radius_m=0)
@@ -21,8 +20,7 @@ CENTRES = shapely.points(*np.meshgrid(np.arange(COLS) + 0.5, np.arange(ROWS) + 0
 NUMBERS = st.floats(-3, 21, allow_nan=False)
 
 
-@settings(max_examples=examples(60))
-@given(st.tuples(NUMBERS, NUMBERS), st.tuples(NUMBERS, NUMBERS))
+@tried(60, st.tuples(NUMBERS, NUMBERS), st.tuples(NUMBERS, NUMBERS))
 def test_a_cut_leaves_every_cell_on_its_side(one, other):
     change = Split(op="split", room="b", line=[list(one), list(other)], name="new")
     left = np.array(
@@ -67,8 +65,7 @@ def test_a_name_takes_its_point_along() -> None:
     assert (after.label_of == ROOMS.label_of).all()
 
 
-@settings(max_examples=examples(40))
-@given(st.integers(0, 3), NUMBERS, NUMBERS)
+@tried(40, st.integers(0, 3), NUMBERS, NUMBERS)
 def test_a_moved_corner_changes_the_cells_between_both_outlines(which, x, y):
     ring = rings_of(ROOMS, GRID)[1][0]
     corner = ring[which % len(ring)]

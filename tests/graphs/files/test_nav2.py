@@ -7,7 +7,7 @@ from pathlib import Path
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -15,7 +15,7 @@ import hybridnav as hn
 from hybridnav.harness.judges import segment_faults
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.nav2_reader import read_nav2
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, occupancy_grid, tried
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +27,7 @@ def topology(classes):
     return hn.TopologicalMap(hn.DualGraphPyramid.build(occupancy_grid(classes)))
 
 
-@given(class_grids(20))
-@settings(max_examples=examples(40))
+@tried(40, class_grids(20))
 def test_edges_are_free_and_nodes_connected_exactly_where_free_space_is(folder, classes):
     if not (classes == hn.CellClass.FREE).any():
         return

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -27,10 +26,10 @@ from tests.strategies import (
     Scene,
     class_grids,
     drawn,
-    examples,
     free_cells,
     occupancy_grid,
     scenes,
+    tried,
 )
 
 METHODS: dict[str, Callable[[OccupancyGrid], Solver]] = {
@@ -59,8 +58,7 @@ def make(name: str, grid: OccupancyGrid) -> Solver:
 
 
 @pytest.mark.parametrize("name", METHODS)
-@settings(max_examples=examples(40))
-@given(classes=class_grids(), seed=st.integers(0, 1000))
+@tried(40, classes=class_grids(), seed=st.integers(0, 1000))
 def test_paths_are_legal_and_as_long_as_the_bound_allows(name, classes, seed):
     grid = occupancy_grid(classes)
     method = make(name, grid)
@@ -219,8 +217,7 @@ def test_a_cell_that_is_not_free_is_named(cell: Cell) -> None:
         method.solve(cell, (0, 0))
 
 
-@settings(max_examples=examples(60))
-@given(scene=scenes(), seed=st.integers(0, 10**6))
+@tried(60, scene=scenes(), seed=st.integers(0, 10**6))
 def test_solvability_is_that_of_the_grid(scene: Scene, seed: int) -> None:
     topology = map_of_scene(scene)
     method, again = SimpleGraphPyramid(topology), SimpleGraphPyramid(topology)
@@ -246,8 +243,7 @@ def test_a_map_without_a_free_cell_can_be_prepared(line: str) -> None:
     assert method.n_nodes == method.n_edges == 0
 
 
-@settings(max_examples=examples(80))
-@given(scene=scenes(), seed=st.integers(0, 10**6))
+@tried(80, scene=scenes(), seed=st.integers(0, 10**6))
 def test_the_simple_graph_plans_as_the_multigraph_where_no_arcs_are_parallel(scene, seed):
     topology = map_of_scene(scene)
     method = SimpleGraphPyramid(topology)

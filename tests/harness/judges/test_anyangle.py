@@ -8,7 +8,7 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
@@ -16,11 +16,10 @@ from hybridnav.harness.judges import ScipyOptimum, VisibilityGraph, segment_faul
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.files import load_map
 from tests.oracle.grid import length_of_points
-from tests.strategies import class_grids, drawn, examples, framed, occupancy_grid
+from tests.strategies import class_grids, drawn, framed, occupancy_grid, seeds, tried
 
 Cell = tuple[int, int]
 
-seeds = st.integers(0, 2**32 - 1)
 yaws = st.sampled_from([0.0, 0.7])
 
 
@@ -63,8 +62,7 @@ def _pinched(free: Any, row: int, col: int) -> bool:
     return bool(a == d and b == c and a != b)
 
 
-@given(class_grids(max_side=12), seeds, yaws)
-@settings(max_examples=examples(150))
+@tried(150, class_grids(max_side=12), seeds, yaws)
 def test_optimum_lies_between_the_straight_line_and_the_grid_optimum(classes, seed, yaw_rad):
     start, goal = two_cells(classes, seed)
     grid = framed(classes, yaw_rad)
@@ -84,8 +82,7 @@ def test_optimum_lies_between_the_straight_line_and_the_grid_optimum(classes, se
     np.testing.assert_allclose(found.points[-1], grid.frame.points_of(goal))
 
 
-@given(class_grids(max_side=5), seeds)
-@settings(max_examples=examples(40))
+@tried(40, class_grids(max_side=5), seeds)
 def test_no_path_over_any_lattice_corners_is_shorter(classes: Any, seed: int) -> None:
     start, goal = two_cells(classes, seed)
     grid = occupancy_grid(classes)

@@ -4,13 +4,12 @@ import itertools
 
 import numpy as np
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.harness.judges import clearance_of, contacts_of, segment_faults
 from hybridnav.maps import CellClass
-from tests.strategies import drawn, examples, framed, occupancy_grid
+from tests.strategies import drawn, framed, occupancy_grid, seeds, tried
 
 WITHIN = 1 / 128 + 1e-6
 
@@ -23,7 +22,7 @@ def squares(chosen):
 @st.composite
 def lines_on_maps(draw):
     shape = draw(st.tuples(st.integers(1, 8), st.integers(1, 8)))
-    seed = draw(st.integers(0, 2**32 - 1))
+    seed = draw(seeds)
     rng = np.random.default_rng(seed)
     classes = rng.choice(3, p=[0.3, 0.6, 0.1], size=shape).astype(np.uint8)
     per_cell = draw(st.sampled_from([1, 2, 1024]))  # corners, halves of sides, anywhere
@@ -32,8 +31,7 @@ def lines_on_maps(draw):
     return classes, points
 
 
-@settings(deadline=None, max_examples=examples(150))
-@given(lines_on_maps(), st.booleans())
+@tried(150, lines_on_maps(), st.booleans())
 def test_contacts_are_what_shapely_finds_outside_the_free_squares(scene, allow_unexplored):
     classes, points = scene
     grid = occupancy_grid(classes)
@@ -61,8 +59,7 @@ def test_contacts_are_what_shapely_finds_outside_the_free_squares(scene, allow_u
         assert line.distance(shapely.Point(each.x, each.y)) < 1e-6
 
 
-@settings(deadline=None, max_examples=examples(100))
-@given(lines_on_maps(), st.floats(0.1, 3.0))
+@tried(100, lines_on_maps(), st.floats(0.1, 3.0))
 def test_clearances_are_those_of_shapely(scene, limit_m):
     classes, points = scene
     found = clearance_of(occupancy_grid(classes), points, limit_m=limit_m)

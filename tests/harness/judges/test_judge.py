@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from hybridnav.errors import InvalidValueError
 from hybridnav.harness.judges import ScipyOptimum, judge_path, segment_faults
 from hybridnav.maps import CellClass, OccupancyGrid
 from tests.oracle.grid import distances, move_graph
-from tests.strategies import class_grids, drawn, examples, framed, occupancy_grid
+from tests.strategies import class_grids, drawn, framed, occupancy_grid, seeds, tried
 
 Position = tuple[Fraction, Fraction]
 
-seeds = st.integers(0, 2**32 - 1)
 small_maps = class_grids(max_side=7)
 
 
@@ -111,8 +110,7 @@ def _joined(free: Any, corner: Position, before: set[Any], after: set[Any]) -> b
         seen |= more
 
 
-@given(small_maps, seeds)
-@settings(max_examples=examples(150))
+@tried(150, small_maps, seeds)
 def test_segments_on_halves_are_judged_as_shapely_does(classes: Any, seed: int) -> None:
     rng, free = np.random.default_rng(seed), classes == CellClass.FREE
     grid = framed(classes, 0.4)
@@ -124,8 +122,7 @@ def test_segments_on_halves_are_judged_as_shapely_does(classes: Any, seed: int) 
         assert legal == (not faults_of(grid, tuple(end), tuple(start)))
 
 
-@given(small_maps, seeds, st.sampled_from([1, 2, 3, 64, 2**24]))
-@settings(max_examples=examples(200))
+@tried(200, small_maps, seeds, st.sampled_from([1, 2, 3, 64, 2**24]))
 def test_segments_are_judged_exactly(classes: Any, seed: int, parts: int) -> None:
     rng, free = np.random.default_rng(seed), classes == CellClass.FREE
     parts = 1 << (parts.bit_length() - 1)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -24,15 +24,13 @@ from hybridnav.harness.judges import (
 from hybridnav.maps import CellClass, OccupancyGrid
 from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
-from tests.oracle.grid import distances, move_graph
-from tests.search.test_grid_search import weighted
-from tests.strategies import class_grids, drawn, examples, framed, occupancy_grid
+from tests.oracle.grid import distances, move_graph, weighted
+from tests.strategies import class_grids, drawn, framed, occupancy_grid, seeds, tried
 
 ROOM = drawn(".....", "..#..", ".....", ".#.?.", "..#..")
 
 
-@given(class_grids(max_side=8), st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(60))
+@tried(60, class_grids(max_side=8), seeds)
 def test_the_cells_of_a_shortest_path_are_those_that_it_passes(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
@@ -136,14 +134,7 @@ def arc(radius_m: float, start_rad: float, turn_rad: float) -> tuple[Any, Any]:
     return points, at + math.copysign(math.pi / 2, turn_rad)
 
 
-@given(
-    st.floats(0.3, 9.0),
-    st.floats(-4, 4),
-    st.floats(0.01, 3.0),
-    st.booleans(),
-    st.integers(0, 2**32 - 1),
-)
-@settings(max_examples=examples(60))
+@tried(60, st.floats(0.3, 9.0), st.floats(-4, 4), st.floats(0.01, 3.0), st.booleans(), seeds)
 def test_chords_lie_on_the_circle_and_have_its_length(
     radius_m: float, start_rad: float, turn_rad: float, to_the_left: bool, seed: int
 ) -> None:
@@ -210,8 +201,7 @@ def test_a_step_far_beyond_the_map_takes_no_more_points_than_its_ends() -> None:
     assert chords.points.tolist() == [[1.0, 1.0], [1e12, 1.0]]
 
 
-@given(class_grids(max_side=20), st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(80), deadline=None)
+@tried(80, class_grids(max_side=20), seeds)
 def test_costs_are_those_of_scipy(classes: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     grid = occupancy_grid(classes, resolution_m=0.5)

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.maps.costs import cost_along
 from tests.layers import grid_of, layer_of
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
 # nav2_costmap_2d/inflation_layer.hpp, InflationLayer::computeCost, worked out by hand for
 # nav2_bringup's inflation_radius 0.70 and cost_scaling_factor 3.0, cells of 0.05 m and an inscribed
@@ -68,14 +67,14 @@ def nav2_cost(cells: float, resolution_m: float, inscribed_m: float, scaling: fl
     return int(252 * math.exp(-1.0 * scaling * (cells * resolution_m - inscribed_m)))
 
 
-@given(
-    st.integers(0, 2**32 - 1),
+@tried(
+    60,
+    seeds,
     st.sampled_from([0.025, 0.05, 0.1]),
     st.sampled_from([0.0, 0.22, 0.25]),
     st.sampled_from([0.3, 0.55, 0.7, 1.0, 3.3]),
     st.sampled_from([0.0, 1.5, 3.0, 10.0]),
 )
-@settings(max_examples=examples(60))
 def test_every_cell_has_the_cost_of_its_nearest_obstacle(
     seed: int, resolution_m: float, inscribed_m: float, inflation_m: float, scaling: float
 ) -> None:
@@ -359,10 +358,7 @@ coordinates = st.one_of(
 )
 
 
-@given(
-    st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=5), st.integers(0, 2**32 - 1)
-)
-@settings(max_examples=examples(150), deadline=None)
+@tried(150, st.lists(st.tuples(coordinates, coordinates), min_size=2, max_size=5), seeds)
 def test_the_cost_is_the_exact_integral(points: Any, seed: int) -> None:
     factors = np.floor(np.random.default_rng(seed).uniform(1, 9, (ROWS, COLS)) * 2**14) / 2**14
     grid = grid_of(np.zeros((ROWS, COLS)), robot_radius_m=0)
@@ -373,8 +369,7 @@ def test_the_cost_is_the_exact_integral(points: Any, seed: int) -> None:
     assert cost_along(grid, layer, points[::-1]) == pytest.approx(cost, rel=1e-12, abs=1e-12)
 
 
-@given(st.integers(0, 2**32 - 1))
-@settings(max_examples=examples(60))
+@tried(60, seeds)
 def test_paths_of_cells_cost_what_their_moves_cost(seed: int) -> None:
     rng = np.random.default_rng(seed)
     steps = rng.integers(-1, 2, (40, 2))

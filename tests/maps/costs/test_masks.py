@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -19,7 +19,7 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import filter_costs
 from hybridnav.maps.files.ros import read_mask
 from tests.layers import grid_of
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
 GREYS = [0, 50, 89, 90, 100, 101, 128, 204, 205, 206, 254, 255]
 
@@ -216,12 +216,11 @@ def frames(draw: st.DrawFn) -> hn.Frame:
 
 
 @pytest.mark.filterwarnings("ignore:.*no cell of the mask:hybridnav.errors.MapWarning")
-@given(st.data())
-@settings(max_examples=examples(100), deadline=None)
+@tried(100, st.data())
 def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(tmp_path_factory, data):
     own, frame = data.draw(frames()), data.draw(frames())
     pose = data.draw(st.tuples(lengths, lengths, angles) | st.just((0.0, 0.0, 0.0)))
-    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(data.draw(seeds))
     values = rng.choice([-1, 0, 30, 50, 99, 100], rng.integers(1, 12, 2)).astype(np.int8)
     grid = grid_of(np.zeros(rng.integers(1, 12, 2)), own, robot_radius_m=0)
     path = write_mask(tmp_path_factory.mktemp("mask"), values, frame)
@@ -256,7 +255,8 @@ def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(tmp_pat
         assert factor - UNIT <= zones.factors[row, col] <= factor
 
 
-@given(
+@tried(
+    300,
     st.integers(-1, 100),
     st.floats(-200, 200),
     st.floats(-3, 3),
@@ -264,7 +264,6 @@ def test_the_value_at_the_centre_of_a_cell_counts_wherever_the_mask_lies(tmp_pat
     st.floats(0.1, 5),
 )
 @example(0, 0.0, 2.225073858507203e-309, "percent", 1.0)
-@settings(max_examples=examples(300), deadline=None)
 def test_limits_are_those_of_the_speed_filter(value, base, multiplier, unit, full):
     """SpeedFilter::process: 0 and unknown limit nothing, base + multiplier * value else; a limit
     below 0, or of more than 100 percent, is dropped, and 0 is no limit."""

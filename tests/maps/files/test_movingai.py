@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
 from hybridnav.maps import CellClass, Frame
 from hybridnav.maps.files import Scenario, load_map, load_scenarios
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, occupancy_grid, tried
 
 HEADER = "type octile\nheight 3\nwidth 4\nmap\n"
 BODY = ".GS.\n@OTW\n..@.\n"
@@ -177,8 +176,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("maps")
 
 
-@given(class_grids())
-@settings(max_examples=examples(60))
+@tried(60, class_grids())
 def test_free_cells_survive_and_all_others_are_occupied(folder, classes):
     hn.write_movingai_map(occupancy_grid(classes), folder / "again.map")
     again = hn.load_map(folder / "again.map", robot_radius_m=0)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import example, given, settings
+from hypothesis import example
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
@@ -20,7 +20,7 @@ import hybridnav as hn
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning
 from hybridnav.maps import CellClass
 from hybridnav.maps.files import load_map as load_inflated
-from tests.strategies import examples
+from tests.strategies import tried
 
 load_map = partial(load_inflated, robot_radius_m=0)
 """Values of the file, cell by cell."""
@@ -485,13 +485,13 @@ def written_again(path: Path, folder: Path) -> Path:
     return target.with_suffix(".pgm")
 
 
-@given(
+@tried(
+    100,
     arrays(np.uint8, SHAPES),
     st.tuples(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3), st.sampled_from([0.0, 3.14, -0.7])),
     st.sampled_from([0.05, 0.1, 1 / 3, 1e-4]),
     thresholds(),
 )
-@settings(max_examples=examples(100))
 @pytest.mark.filterwarnings("ignore:.* cells have grey 205:hybridnav.errors.MapWarning")
 def test_an_image_of_8_bits_is_written_with_equal_pixels(folder, pixels, origin, side, limits):
     Image.fromarray(pixels).save(folder / "given.pgm")
@@ -514,12 +514,12 @@ def test_our_maps_are_written_with_equal_pixels(name: str, tmp_path: Path) -> No
     assert np.array_equal(np.asarray(again), np.asarray(Image.open(MAPS / name / f"{name}.pgm")))
 
 
-@given(
+@tried(
+    100,
     arrays(np.float32, SHAPES, elements=st.one_of(st.floats(0, 1, width=32), st.just(np.nan))),
     thresholds(),
 )
 @example(np.array([[0.1953125]], dtype=np.float32), (0.5, 1.0))
-@settings(max_examples=examples(100))
 def test_cells_keep_their_class_and_nearly_their_occupancy(folder, probability, limits):
     low, high = limits
     grid = hn.OccupancyGrid(

@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.page.requests import Merge, Rename, Split, changed
 from hybridnav.maps import RoomLabels
-from tests.strategies import drawn, examples, occupancy_grid
+from tests.strategies import drawn, occupancy_grid, tried
 
 FLOOR = drawn(
     "#############################",
@@ -125,9 +124,10 @@ def squeezed(text):
     return re.sub(r"\s", "", text)
 
 
-@settings(max_examples=examples(60))
-@given(
-    file=files(), renames=st.lists(st.tuples(st.integers(0, 2), st.sampled_from(NAMES)), max_size=5)
+@tried(
+    60,
+    file=files(),
+    renames=st.lists(st.tuples(st.integers(0, 2), st.sampled_from(NAMES)), max_size=5),
 )
 def test_a_new_name_changes_nothing_but_the_name(tmp_path_factory, file, renames):
     text, parts = file
@@ -181,8 +181,7 @@ def after(rooms, change):
     return rooms
 
 
-@settings(max_examples=examples(60))
-@given(file=files(), steps=st.lists(changes(), min_size=1, max_size=6))
+@tried(60, file=files(), steps=st.lists(changes(), min_size=1, max_size=6))
 def test_comments_survive_whatever_becomes_of_the_rooms(tmp_path_factory, file, steps):
     text, _ = file
     path = tmp_path_factory.mktemp("comments") / "rooms.yaml"

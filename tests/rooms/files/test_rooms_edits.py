@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import shapely
 import yaml
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
@@ -18,7 +17,7 @@ import hybridnav as hn
 from hybridnav.maps import CellClass, RoomLabels
 from hybridnav.rooms.files.outlines import TOLERANCE_M, outlines_of
 from tests.drawn_rooms import write_ros
-from tests.strategies import drawn, examples, occupancy_grid
+from tests.strategies import drawn, occupancy_grid, tried
 
 FLOOR = drawn(
     "#############################",
@@ -76,8 +75,7 @@ def layouts(draw):
     return occupancy_grid(classes, resolution_m=resolution_m), RoomLabels(names, dense[label_of])
 
 
-@given(layout=layouts())
-@settings(max_examples=examples(20))
+@tried(20, layout=layouts())
 def test_every_free_cell_is_read_with_the_room_that_it_had(tmp_path_factory, layout):
     grid, rooms = layout
     path = tmp_path_factory.mktemp("any") / "rooms.yaml"

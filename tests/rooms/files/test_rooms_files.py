@@ -13,12 +13,7 @@ from hybridnav.rooms.files.paint import cells_inside
 from tests.strategies import class_grids, drawn, occupancy_grid
 
 FLAT = drawn(
-    "############",
-    "#....#.....#",
-    "#....#.....#",
-    "#..........#",
-    "#....#.....#",
-    "############",
+    "############", "#....#.....#", "#....#.....#", "#..........#", "#....#.....#", "############"
 )
 KITCHEN = "[[1, 1], [5, 1], [5, 5], [1, 5]]"
 LAB = "[[6, 1], [11, 1], [11, 5], [6, 5]]"

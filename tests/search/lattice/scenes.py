@@ -10,9 +10,8 @@ from hybridnav.harness.judges import segment_faults
 from hybridnav.maps.costs import cost_along
 from hybridnav.refine import CostLine
 from tests.layers import grid_of, layer_of
-from tests.strategies import class_grids
+from tests.strategies import class_grids, seeds
 
-SEEDS = st.integers(0, 2**32 - 1)
 GRAIN = 2.0**-24
 
 
@@ -79,4 +78,4 @@ def settled(field: Field, line: Any) -> Any:
 def fields(draw: st.DrawFn, max_side: int = 24) -> Field:
     """Draw maps of one row and of all classes, and factors."""
     free = draw(class_grids(max_side)) == hn.CellClass.FREE
-    return Field(free, factors_of(free.shape, np.random.default_rng(draw(SEEDS))))
+    return Field(free, factors_of(free.shape, np.random.default_rng(draw(seeds))))

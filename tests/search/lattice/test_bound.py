@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 import hybridnav as hn
 from hybridnav.maps.costs import cost_along
@@ -14,8 +13,8 @@ from hybridnav.refine import CostLine
 from hybridnav.search.lattice import LatticeSearch, build_lattice, cost_bound
 from tests.layers import layer_of
 from tests.oracle.any_angle_cost import SidePoints
-from tests.search.lattice.scenes import SEEDS, Field, fields, settled
-from tests.strategies import MAX_SIDE, examples
+from tests.search.lattice.scenes import Field, fields, settled
+from tests.strategies import MAX_SIDE, seeds, tried
 
 Ends = tuple[tuple[float, float], tuple[float, float]]
 Cells = tuple[tuple[int, int], tuple[int, int]]
@@ -33,8 +32,7 @@ INSIDE = 1e-9
 """Cells by which an end on a side is moved into its cell, for the oracle."""
 
 
-@given(fields(min(MAX_SIDE, 14)), SEEDS)
-@settings(max_examples=examples(300), deadline=None)
+@tried(300, fields(min(MAX_SIDE, 14)), seeds)
 def test_no_path_costs_less(field: Field, seed: int) -> None:
     rng = np.random.default_rng(seed)
     cells, ends = field.positions(rng, 2)

@@ -4,13 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.search.lattice import LatticeSearch, build_lattice
-from tests.search.lattice.scenes import SEEDS, Field, factors_of, fields
-from tests.strategies import MAX_SIDE, drawn, examples
+from tests.search.lattice.scenes import Field, factors_of, fields
+from tests.strategies import MAX_SIDE, drawn, seeds, tried
 
 
 def check_lines(field: Field, search: LatticeSearch, rng: np.random.Generator, count: int) -> None:
@@ -30,8 +29,7 @@ def check_lines(field: Field, search: LatticeSearch, rng: np.random.Generator, c
             assert moved.all() or (start == goal).all()
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(200), deadline=None)
+@tried(200, fields(MAX_SIDE), seeds)
 def test_it_is_as_connected_as_the_grid(field: Field, seed: int) -> None:
     search = LatticeSearch(build_lattice(field.free, field.factors))
     check_lines(field, search, np.random.default_rng(seed), 20)
@@ -93,8 +91,7 @@ def renewed(lattice: Any, before: Field, now: Field) -> Any:
     return lattice.renewed(now.free, now.factors, np.flatnonzero(differs)).with_landmarks()
 
 
-@given(fields(MAX_SIDE), SEEDS)
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, fields(MAX_SIDE), seeds)
 def test_a_renewed_lattice_answers_as_one_built_anew(field: Field, seed: int) -> None:
     rng = np.random.default_rng(seed)
     first, lattice = field, build_lattice(field.free, field.factors)

@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from hybridnav.maps import CellClass
 from hybridnav.search.mesh import MeshPath, MeshSearch, build_mesh
 from tests.oracle.mesh import KINDS, search_of
-from tests.strategies import class_grids, examples
+from tests.strategies import class_grids, seeds, tried
 
-seeds = st.integers(0, 2**32 - 1)
 SLACK = 1e-9
 Cell = tuple[int, int]
 
@@ -72,8 +71,7 @@ _ROUNDED = """
 """Where a search is stopped one step before it ends, with a bound that rounding put above."""
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
+@tried(40, classes=class_grids(max_side=14), seed=seeds, kind=st.sampled_from(KINDS))
 @example(
     classes=np.array([list(row) for row in _ROUNDED.split()], dtype=np.uint8),
     seed=139,
@@ -100,8 +98,8 @@ def test_bounds_rise_to_the_optimum_at_every_step(classes: Any, seed: int, kind:
     assert between(search, start, goal).length_cells == optimum
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(
+@tried(
+    40,
     classes=class_grids(max_side=14),
     seed=seeds,
     epsilon=st.sampled_from([0.01, 0.1, 1.0]),

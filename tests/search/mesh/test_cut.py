@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -33,9 +33,7 @@ from tests.oracle.mesh import (
     search_of,
     twice_the_area,
 )
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
-
-seeds = st.integers(0, 2**32 - 1)
+from tests.strategies import class_grids, drawn, occupancy_grid, seeds, tried
 
 
 @st.composite
@@ -68,8 +66,7 @@ def assert_shortest(searches: list[MeshSearch], free: Any, seed: int) -> None:
             assert found.lower_bound_cells == pytest.approx(length, abs=1e-9)
 
 
-@settings(max_examples=examples(60), deadline=None)
-@given(closures(least=0), st.integers(0, 2**32 - 1))
+@tried(60, closures(least=0), seeds)
 def test_cutting_is_building_without(cut: tuple[Any, Any], seed: int) -> None:
     free, closed = cut
     left = free.copy()
@@ -113,7 +110,7 @@ def test_only_polygons_that_are_touched_are_made_anew() -> None:
 def changes(draw: st.DrawFn) -> list[Any]:
     """Free cells, and what they become: boxes freed, blocked or shuffled, and single cells."""
     maps = [draw(class_grids(max_side=18)) == CellClass.FREE]
-    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(draw(seeds))
     for _ in range(draw(st.integers(1, 5))):
         free = maps[-1].copy()
         row, col = (int(rng.integers(side)) for side in free.shape)
@@ -140,8 +137,7 @@ def prepared_by_queries(mesh: ConvexMesh, free: Any) -> MeshSearch:
     return search
 
 
-@settings(max_examples=examples(80), deadline=None)
-@given(changes(), st.integers(0, 2**32 - 1))
+@tried(80, changes(), seeds)
 def test_a_renewed_mesh_is_as_good_as_a_fresh_one(maps: list[Any], seed: int) -> None:
     mesh = build_mesh(maps[0])
     for before, free in itertools.pairwise(maps):
@@ -209,8 +205,7 @@ def detour_of(
     return left, search, DetourSearch(search, free, closed), MeshSearch(build_mesh(left))
 
 
-@settings(max_examples=examples(120), deadline=None)
-@given(closures(), seeds, st.sampled_from(KINDS))
+@tried(120, closures(), seeds, st.sampled_from(KINDS))
 def test_a_detour_is_the_shortest_path_of_a_mesh_without(case, seed, kind):
     left, search, round_it, anew = detour_of(case, kind)
     for query in queries(left, seed):
@@ -227,8 +222,7 @@ def test_a_detour_is_the_shortest_path_of_a_mesh_without(case, seed, kind):
             assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(closures(), seeds)
+@tried(40, closures(), seeds)
 def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(case, seed):
     free, closed = case
     search = MeshSearch(build_mesh(free))
@@ -248,8 +242,7 @@ def test_what_is_closed_in_turns_leaves_the_open_map_and_the_others_alone(case, 
             )
 
 
-@settings(max_examples=examples(60), deadline=None)
-@given(closures(), seeds)
+@tried(60, closures(), seeds)
 def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(case, seed):
     free, closed = case
     before = free ^ (np.random.default_rng(seed).random(free.shape) < 0.1)
@@ -266,8 +259,7 @@ def test_a_detour_on_a_renewed_mesh_is_the_shortest_path_of_a_fresh_one(case, se
             assert opened.length_cells == pytest.approx(optimum, abs=1e-9)
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(closures(), seeds)
+@tried(40, closures(), seeds)
 def test_many_paths_are_judged_as_one_by_one(case: tuple[Any, Any], seed: int) -> None:
     left, search, round_it, _ = detour_of(case)
     cells, positions = zip(*queries(left, seed), strict=True)
@@ -312,8 +304,7 @@ def test_two_cells_that_meet_at_a_corner_let_nothing_through(*, is_prepared: boo
     assert not one.is_met_by(opened)
 
 
-@settings(max_examples=examples(25), deadline=None)
-@given(closures(), seeds, st.sampled_from([0.01, 0.3]))
+@tried(25, closures(), seeds, st.sampled_from([0.01, 0.3]))
 def test_a_detour_is_as_near_the_optimum_as_it_was_asked_to_be(case, seed, epsilon):
     left, _, round_it, anew = detour_of(case)
     for query in queries(left, seed):

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume
 from scipy import ndimage
 
 from benchmarks.worlds import office_world, tiled
@@ -36,22 +35,19 @@ from tests.oracle.mesh import (
     search_of,
     twice_the_area,
 )
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, occupancy_grid, seeds, tried
 
-seeds = st.integers(0, 2**32 - 1)
 DATA = Path(os.environ.get("HYBRIDNAV_DATA", "no data")) / "any_angle_optima"
 OPTIMA = sorted(path.stem for path in DATA.glob("*.csv"))
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(class_grids())
+@tried(40, class_grids())
 def test_polygons_are_convex_and_their_area_is_that_of_the_free_cells(classes: Any) -> None:
     free = classes == CellClass.FREE
     assert twice_the_area(build_mesh(free)) == 2 * free.sum()
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(class_grids())
+@tried(40, class_grids())
 def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
     free = classes == CellClass.FREE
     mesh = build_mesh(free)
@@ -63,8 +59,7 @@ def test_sides_are_shared_by_two_polygons_or_are_walls(classes: Any) -> None:
     assert length == sum(int(np.abs(np.diff(padded, axis=axis)).sum()) for axis in (0, 1))
 
 
-@settings(max_examples=examples(40), deadline=None)
-@given(class_grids())
+@tried(40, class_grids())
 def test_each_free_cell_knows_a_polygon_round_its_centre(classes: Any) -> None:
     free = classes == CellClass.FREE
     mesh = build_mesh(free)
@@ -84,8 +79,7 @@ def searches(mesh: ConvexMesh) -> list[MeshSearch]:
     return [search_of(mesh, kind) for kind in KINDS]
 
 
-@settings(max_examples=examples(60), deadline=None)
-@given(class_grids(max_side=14), seeds)
+@tried(60, class_grids(max_side=14), seeds)
 def test_paths_are_as_short_as_those_of_the_visibility_graph(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE
     assume(free.any())

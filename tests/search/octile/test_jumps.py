@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume
 from numpy.typing import NDArray
 
 from benchmarks.worlds import office_world
@@ -28,11 +27,10 @@ from hybridnav.search.octile.kernels.tables import number_cells, turning_cells
 from tests.one_way import random_scene
 from tests.oracle.grid import assert_legal, distances, move_graph, recounted
 from tests.search.test_grid_search import problem_set, scenario_files
-from tests.strategies import MAX_SIDE, class_grids, drawn, examples
+from tests.strategies import MAX_SIDE, class_grids, drawn, examples, seeds, tried
 
 Cell = tuple[int, int]
 
-seeds = st.integers(0, 2**32 - 1)
 QUICK_FILES = 4
 
 
@@ -69,14 +67,12 @@ def map_of(*lines: str) -> NDArray[np.bool_]:
     return free
 
 
-@settings(max_examples=examples(30), deadline=None)
-@given(class_grids(max_side=6))
+@tried(30, class_grids(max_side=6))
 def test_paths_between_all_pairs_of_small_maps_are_shortest(classes: Any) -> None:
     assert_all_pairs(classes == CellClass.FREE)
 
 
-@settings(max_examples=examples(60), deadline=None)
-@given(class_grids(), seeds)
+@tried(60, class_grids(), seeds)
 def test_paths_are_shortest(classes: Any, seed: int) -> None:
     free = classes == CellClass.FREE
     assume(free.any())
@@ -187,8 +183,7 @@ def test_a_graph_with_an_arc_without_its_reverse_is_not_contracted() -> None:
         assert contract_graph(halved) is halved
 
 
-@settings(max_examples=examples(60), deadline=None)
-@given(class_grids())
+@tried(60, class_grids())
 def test_where_nothing_has_a_direction_paths_turn_at_corner_cells(classes: Any) -> None:
     free = np.pad(classes == CellClass.FREE, 1)
     moves, cells = legal_moves(free, False).ravel(), np.flatnonzero(free)

@@ -7,14 +7,13 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from tests.ext.fleet.files import graph_writers as writers
 from tests.ext.fleet.files.graph_writers import Plain
 from tests.nav2_reader import read_nav2
-from tests.strategies import examples
+from tests.strategies import tried
 
 _NUMBERS = st.floats(-1e6, 1e6, allow_nan=False)
 _TEXTS = st.text(st.characters(codec="utf-8", categories=("L", "N", "P", "S")), max_size=20)
@@ -64,8 +63,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("graphs")
 
 
-@given(for_nav2)
-@settings(max_examples=examples(60))
+@tried(60, for_nav2)
 def test_nav2(folder, plain):
     ids = writers.write_nav2(folder / "a.geojson", plain)
     graph = hn.ext.fleet.load_graph(folder / "a.geojson")
@@ -92,8 +90,7 @@ FORMATS = {
 
 
 @pytest.mark.parametrize("file", FORMATS)
-@given(st.data())
-@settings(max_examples=examples(60))
+@tried(60, st.data())
 def test_what_is_written_is_read(folder, file, data):
     write, form, name, names = FORMATS[file]
     plain = data.draw(plain_graphs(names))
@@ -110,8 +107,7 @@ def test_what_is_written_is_read(folder, file, data):
         assert all(facts == {"action": "move_base"} for facts in edges)
 
 
-@given(plain_graphs(_ANY_NAMES))
-@settings(max_examples=examples(60))
+@tried(60, plain_graphs(_ANY_NAMES))
 def test_networkx_there_and_back(plain):
     graph = hn.graphs.WaypointGraph.from_networkx(plain.directed)
     assert means(graph) == expected(plain)
@@ -121,8 +117,7 @@ def test_networkx_there_and_back(plain):
     assert means(hn.graphs.WaypointGraph.from_networkx(back)) == means(graph)
 
 
-@given(for_nav2)
-@settings(max_examples=examples(60))
+@tried(60, for_nav2)
 def test_nav2_written_again_means_the_same(folder, plain):
     writers.write_nav2(folder / "a.geojson", plain)
     graph = hn.ext.fleet.load_graph(folder / "a.geojson")

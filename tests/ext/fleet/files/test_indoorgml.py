@@ -19,7 +19,7 @@ import hybridnav as hn
 from hybridnav.ext.fleet import Building, Floor, Link, LinkEnd
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.ext.hostile import reader
-from tests.strategies import class_grids, examples, occupancy_grid
+from tests.strategies import class_grids, examples, occupancy_grid, tried
 
 POSITION = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 3}
 
@@ -102,8 +102,7 @@ def _check_duality(layer):
     return cells, nodes, lines, edges
 
 
-@given(class_grids(14))
-@settings(max_examples=examples(60))
+@tried(60, class_grids(14))
 def test_cells_are_places_and_edges_are_arcs_with_the_lines_between_them(path, classes):
     here = topology(classes)
     if not here.n_places:
@@ -141,8 +140,7 @@ def test_cells_are_places_and_edges_are_arcs_with_the_lines_between_them(path, c
     assert [lengths[f"A0.{arc}"] for arc in here.arc_ids] == here.level.n_cracks.tolist()
 
 
-@given(class_grids(14), st.booleans())
-@settings(max_examples=examples(60))
+@tried(60, class_grids(14), st.booleans())
 def test_what_is_written_is_read_and_written_again(path, classes, with_rooms):
     labels = np.where(np.arange(classes.shape[1]) < classes.shape[1] // 2, 0, 1)
     labels = np.broadcast_to(labels, classes.shape)

@@ -6,13 +6,13 @@ from collections import Counter
 from datetime import datetime, timedelta, timezone
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume
 
 import hybridnav as hn
 from hybridnav.ext.fleet import join_links
 from tests.ext.fleet.files.drawn_buildings import buildings
 from tests.ext.fleet.files.lif_schema import read_lif
-from tests.strategies import examples
+from tests.strategies import tried
 
 NOON = datetime(2026, 3, 1, 12, 30, 15, 120000, tzinfo=timezone.utc)
 
@@ -22,8 +22,7 @@ def file(tmp_path_factory):
     return tmp_path_factory.mktemp("lif") / "house.json"
 
 
-@given(buildings())
-@settings(max_examples=examples(150))
+@tried(150, buildings())
 def test_a_master_control_finds_every_node_and_edge(file, building):
     joined = join_links(building)
     ids = [f"{floor.name}/{node}" for floor in joined.floors for node in range(floor.graph.n_nodes)]
@@ -54,8 +53,7 @@ def test_a_master_control_finds_every_node_and_edge(file, building):
     assert crossing == wanted
 
 
-@given(buildings())
-@settings(max_examples=examples(150))
+@tried(150, buildings())
 def test_what_is_read_back_is_what_was_written(file, building):
     joined = join_links(building)
     hn.ext.fleet.export_lif(building, file, vehicle_types=["A.B"])

@@ -9,7 +9,6 @@ import networkx as nx
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
@@ -27,7 +26,7 @@ from hybridnav.ext.fleet import (
 from tests.drawn_rooms import HOUSE, topology_of
 from tests.ext.fleet.files.drawn_buildings import buildings
 from tests.ext.fleet.files.osm_reader import east_north, read_osm
-from tests.strategies import examples
+from tests.strategies import tried
 
 ANCHORS = st.builds(
     hn.ext.fleet.Anchor, st.floats(-60, 60), st.floats(-179, 179), st.floats(-360, 360)
@@ -41,8 +40,7 @@ def file(tmp_path_factory):
     return tmp_path_factory.mktemp("osm") / "house.osm"
 
 
-@given(ANCHORS, NEAR, NEAR)
-@settings(max_examples=examples(300))
+@tried(300, ANCHORS, NEAR, NEAR)
 def test_degrees_are_those_of_the_plane_that_touches_the_earth(anchor, x, y):
     place = anchor.degrees_of((x, y))
     east, north = east_north((anchor.latitude_deg, anchor.longitude_deg), place)
@@ -73,8 +71,7 @@ def facts_of(graph):
     )
 
 
-@given(buildings(), ANCHORS)
-@settings(max_examples=examples(150))
+@tried(150, buildings(), ANCHORS)
 def test_what_is_read_back_is_what_was_written(file, building, anchor):
     joined = join_links(building)
     hn.ext.fleet.export_osm(building, file, anchor=anchor)
@@ -236,8 +233,7 @@ def test_rooms_and_doors_of_simple_indoor_tagging(tmp_path):
         hn.ext.fleet.load_graph(path, floor="roof")
 
 
-@given(st.floats(-1, 7), st.floats(-1, 5), st.floats(-1, 7), st.floats(-1, 5))
-@settings(max_examples=examples(100))
+@tried(100, st.floats(-1, 7), st.floats(-1, 5), st.floats(-1, 7), st.floats(-1, 5))
 def test_ends_of_doors_never_make_an_outline_cross_itself(file, a, b, c, d):
     outline = np.array([[0, 0], [6, 0], [6, 4], [3, 4], [3, 0.2], [2.9, 4], [0, 4.0]])
     floor = FloorGraph(

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import shapely
 import yaml
-from hypothesis import assume, given, settings
+from hypothesis import assume
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.fleet import BuildingGraph, LinkEnd, align_floors, join_links
 from tests.ext.fleet.files.drawn_buildings import buildings
 from tests.ext.fleet.files.rmf_reader import read_rmf
-from tests.strategies import examples
+from tests.strategies import tried
 
 
 @pytest.fixture(scope="module")
@@ -36,8 +36,7 @@ def lifts_apart(building):
     )
 
 
-@given(buildings(aligned=True))
-@settings(max_examples=examples(150))
+@tried(150, buildings(aligned=True))
 def test_the_fleet_adapter_sees_every_node_edge_door_and_lift(file, building):
     assume(has_edges(building) and lifts_apart(building))
     hn.ext.fleet.export_rmf(building, file)
@@ -68,8 +67,7 @@ def test_the_fleet_adapter_sees_every_node_edge_door_and_lift(file, building):
     assert {name: where for name, (_, where) in found.doors.items()} == names
 
 
-@given(buildings(kinds=["lift"], aligned=True))
-@settings(max_examples=examples(150))
+@tried(150, buildings(kinds=["lift"], aligned=True))
 def test_what_is_read_back_is_what_was_written(file, building):
     assume(has_edges(building) and lifts_apart(building))
     hn.ext.fleet.export_rmf(building, file)
@@ -256,8 +254,7 @@ def drawn(draw):
     return levels
 
 
-@given(drawn(), st.randoms())
-@settings(max_examples=examples(120))
+@tried(120, drawn(), st.randoms())
 def test_pixels_become_the_metres_that_they_were_drawn_from(drawing, levels, order):
     contents = {f"L{k}": level.content(4.0 * k) for k, level in enumerate(levels)}
     names = list(contents)

@@ -10,8 +10,6 @@ from typing import Any
 import networkx as nx
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy import ndimage
 
 import hybridnav as hn
@@ -20,7 +18,7 @@ from hybridnav.ext.live.explore import By, Exploration, Goals, Step, explore, la
 from hybridnav.ext.live.explore.goals import doubtful_spots, narrow_spots
 from hybridnav.ext.live.explore.robot import Robot
 from hybridnav.ext.live.mapping import SimulatedLaser
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
 START = (1.0, 1.0)
 
@@ -155,8 +153,7 @@ def test_wrong_settings_are_refused() -> None:
         explore(full)
 
 
-@settings(max_examples=examples(60))
-@given(st.integers(0, 2**32 - 1))
+@tried(60, seeds)
 def test_goals_are_the_unexplored_places_beside_cells_in_reach(seed: int) -> None:
     rng = np.random.default_rng(seed)
     cells = rng.choice([0.0, 0.5, 1.0], p=[0.6, 0.2, 0.2], size=(9, 9)).astype(np.float32)

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 from lz4.frame import compress as lz4_compress  # type: ignore[import-untyped]
 from rosbags.highlevel import AnyReader
@@ -36,7 +35,7 @@ from tests.ext.live.files.drive import (
     stamp,
 )
 from tests.layers import grid_of
-from tests.strategies import examples
+from tests.strategies import seeds, tried
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -75,8 +74,7 @@ def test_the_frame_of_the_poses_can_be_chosen(tmp_path: Path) -> None:
     assert log.skipped == {"no transforms from laser to moon": 40}
 
 
-@given(st.data())
-@settings(max_examples=examples(60), deadline=None)
+@tried(60, st.data())
 def test_rotations_are_blended_evenly_about_one_axis(data: st.DataObject) -> None:
     """Between two rotations, by the matrix exponential of scipy."""
     numbers = st.floats(-1, 1)
@@ -208,11 +206,10 @@ def test_the_topic_must_be_one_of_scans(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@given(data=st.data())
-@settings(max_examples=examples(16), deadline=None)
+@tried(16, data=st.data())
 def test_maps_survive_a_round_trip(tmp_path_factory, kind, data):
     shape = data.draw(st.tuples(st.integers(1, 9), st.integers(1, 9)))
-    rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+    rng = np.random.default_rng(data.draw(seeds))
     percent = rng.integers(-1, 101, shape)
     probability = np.where(percent < 0, np.nan, percent / 100)
     side = data.draw(st.sampled_from([0.05, 0.1, 0.3, 1.0]))

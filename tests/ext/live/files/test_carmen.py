@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.live.mapping import LaserScan, Mapper
-from tests.strategies import examples
+from tests.strategies import tried
 
 
 def flaser(ranges: list[Any], pose: tuple[Any, Any, Any] = (1.0, 2.0, 0.5), time: Any = 7.5) -> str:
@@ -238,8 +237,7 @@ def test_a_log_may_be_cut_off_anywhere_in_its_last_line(tmp_path: Path, line: st
         assert n_read == 1 or cut > line.index("host") + len("host "), line[:cut]
 
 
-@given(noise=st.binary(max_size=300), at=st.integers(0, 200), packed=st.booleans())
-@settings(max_examples=examples(100))
+@tried(100, noise=st.binary(max_size=300), at=st.integers(0, 200), packed=st.booleans())
 def test_any_bytes_end_in_scans_or_counts(tmp_path_factory, *, noise, at, packed):
     text = "".join(flaser(GOOD, time=k) for k in range(5)).encode()
     content = gzip.compress(text) if packed else text

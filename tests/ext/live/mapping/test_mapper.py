@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybridnav as hn
 from hybridnav.ext.live.mapping import LaserModel, LaserScan, Mapper, ScanSequence
 from tests.oracle.beams import kinds_of_cells
-from tests.strategies import examples
+from tests.strategies import tried
 
 HIT, PASSED = math.log(0.95 / 0.05), math.log(0.19 / 0.81)
 LIMIT = math.log(0.98 / 0.02)
@@ -67,8 +66,7 @@ def expected_evidence(given_scans: list[LaserScan], model: LaserModel, side_m: f
     return evidence
 
 
-@given(st.lists(scans(), min_size=1, max_size=4), MODELS, st.sampled_from([0.25, 0.3, 1.0]))
-@settings(max_examples=examples(120))
+@tried(120, st.lists(scans(), min_size=1, max_size=4), MODELS, st.sampled_from([0.25, 0.3, 1.0]))
 def test_every_cell_has_the_evidence_of_the_definition(given_scans, model, side_m):
     mapper = Mapper(resolution_m=side_m, laser=model)
     for scan in given_scans:
@@ -91,8 +89,7 @@ def test_every_cell_has_the_evidence_of_the_definition(given_scans, model, side_
         assert found[cell] == pytest.approx(1 / (1 + math.exp(-evidence)), abs=1e-6)
 
 
-@given(st.lists(scans(reach=60.0), min_size=1, max_size=5))
-@settings(max_examples=examples(60))
+@tried(60, st.lists(scans(reach=60.0), min_size=1, max_size=5))
 def test_a_grid_that_grew_is_one_that_was_large_from_the_start(given_scans):
     grown = Mapper(resolution_m=0.25)
     large = Mapper(resolution_m=0.25)
@@ -120,8 +117,7 @@ def test_a_scan_counts_once_for_a_cell_and_its_model_says_as_what(*, hits_win, b
     assert row == pytest.approx([0.19, 0.19, 0.19, between, 0.19, 0.95])
 
 
-@given(st.lists(scans(), min_size=1, max_size=3), MODELS, st.floats(-7.0, 7.0))
-@settings(max_examples=examples(60))
+@tried(60, st.lists(scans(), min_size=1, max_size=3), MODELS, st.floats(-7.0, 7.0))
 def test_a_turned_lattice_is_that_of_turned_scans(given_scans, model, yaw_rad):
     """Odd places, so that rounding moves no end of a beam over a side of a cell."""
     corner, (cosine, sine) = (0.7, -3.1), (math.cos(yaw_rad), math.sin(yaw_rad))
@@ -208,8 +204,7 @@ def test_a_wrong_first_pose_does_not_cost_the_map() -> None:
     assert np.array_equal(found.probability, expected.probability, equal_nan=True)
 
 
-@given(st.lists(scans(reach=20.0), min_size=1, max_size=4), MODELS)
-@settings(max_examples=examples(60))
+@tried(60, st.lists(scans(reach=20.0), min_size=1, max_size=4), MODELS)
 def test_a_scan_changes_cells_of_its_area_alone(given_scans, model):
     """The area lies on sides of cells, and shrinks to what the cells of the next grid need."""
     corner_m = (0.1, -0.2)
