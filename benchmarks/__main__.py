@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.common import NEEDED_DATA, Refused
+from benchmarks.options import NEEDED_DATA, Refused
 from hybridnav.errors import HybridNavError
 
 ROOT = Path(__file__).parents[1]

@@ -1,4 +1,4 @@
-"""What several subjects share: options, maps, times, tables."""
+"""What several subjects share: maps, pairs, planners, times, and other checkouts."""
 
 import fnmatch
 import json
@@ -17,10 +17,9 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from hybridnav._base.typing import LongArray
+from hybridnav._base.typing import FloatArray, LongArray
 
 T = TypeVar("T")
-Option = tuple[tuple[str, ...], dict[str, Any]]
 
 ROOT = Path(__file__).parents[1]
 OFFICE = ROOT / "maps" / "office" / "office.yaml"
@@ -29,21 +28,6 @@ FAR_APART = (1.0, 13.2), (40.6, 19.4)
 PLAN = ("plan", str(OFFICE), "--start", "1.0,13.2", "--goal", "40.6,19.4")
 """The command that plans it."""
 RADIUS_M = 0.25
-
-
-class Refused(Exception):  # noqa: N818 - the command line is at fault, not the code
-    """What was asked for cannot be run; the text says why."""
-
-
-def option(*names: str, **settings: Any) -> Option:
-    """Return what `ArgumentParser.add_argument` takes, for the list `OPTIONS` of a subject."""
-    return names, settings
-
-
-DATA = option("--data", type=Path, metavar="FOLDER", help="reference data, else HYBRIDNAV_DATA")
-NEEDED_DATA = option(*DATA[0], **DATA[1])
-"""The same for a subject that cannot do without."""
-SEED = option("--seed", type=int, default=0)
 
 
 def maps_of(data: Path, globs: Sequence[str] = ()) -> list[str]:
@@ -122,22 +106,13 @@ def largest_part(free: Any) -> LongArray:
     return cells
 
 
+def random_pairs(grid: hn.OccupancyGrid, count: int, seed: int) -> FloatArray:
+    """Draw pairs of centres of cells from the largest part of free space, float64 (count, 2, 2)."""
+    cells = np.random.default_rng(seed).choice(largest_part(grid.enterable()), (count, 2))
+    return grid.frame.points_of(cells.reshape(-1, 2)).reshape(-1, 2, 2)
+
+
 def with_classes(grid: hn.OccupancyGrid, classes: Any) -> hn.OccupancyGrid:
     """Return a grid with other classes, without the work of making one."""
     values = {field.name: getattr(grid, field.name) for field in fields(grid)}
     return hn.OccupancyGrid.restored(**{**values, "classes": classes})
-
-
-def print_head(*columns: str) -> None:
-    """Print the head of a table in Markdown."""
-    print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
-
-
-def print_row(*cells: object) -> None:
-    """Print a row of a table in Markdown."""
-    print(f"| {' | '.join(map(str, cells))} |", flush=True)
-
-
-def print_load() -> None:
-    """Print how busy the machine is: a busy one stretches every time."""
-    print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}", flush=True)

@@ -35,10 +35,7 @@ MAX_ROUTINGKIT_CELLS = 100_000
 def needed_package(package: str) -> Any:
     """Return a package that only one rival needs.
 
-    Raises
-    ------
-    InvalidValueError
-        When it is not installed.
+    Raises `InvalidValueError` when it is not installed.
     """
     try:
         return importlib.import_module(package.replace("-", "_"))
@@ -51,10 +48,7 @@ def needed_package(package: str) -> Any:
 def refuse_corner_cutting(grid: OccupancyGrid) -> None:
     """Refuse a map on which paths may cut corners, which no any-angle path does.
 
-    Raises
-    ------
-    UnsuitableMapError
-        When they may.
+    Raises `UnsuitableMapError` when they may.
     """
     if grid.corner_cutting:
         raise UnsuitableMapError(
@@ -299,14 +293,9 @@ class RoutingKit(Rival):
     whole numbers below 2^31 along any path, so on large maps a step has few units: the bound of an
     answer holds their rounding.
 
-    Parameters
-    ----------
-    grid
-        The map; free cells are entered, all others not.
-    costs
-        Costs of its cells, by which paths are cheapest; None for lengths.
-    most_cells
-        Free cells up to which it prepares, which takes 0.15 to 0.3 ms a cell.
+    `grid`: the map; free cells are entered, all others not; `costs`: costs of its cells, by which
+    paths are cheapest; None for lengths; `most_cells`: free cells up to which it prepares, which
+    takes 0.15 to 0.3 ms a cell.
     """
 
     name = package = "pyroutingkit"
@@ -387,10 +376,7 @@ _MOST_UNITS = 10_000
 def _units_of(prices: FloatArray, n_cells: int) -> int:
     """Return the units of a straight step with which no path's weight overflows.
 
-    Raises
-    ------
-    UnsuitableMapError
-        When a path may be so dear that a step would have less than ten.
+    Raises `UnsuitableMapError` when a path may be so dear that a step would have less than ten.
     """
     dearest = float(prices.max(initial=1.0)) * max(n_cells, 1)
     units = min(_MOST_UNITS, int(_MOST_WEIGHT / dearest) - 1)

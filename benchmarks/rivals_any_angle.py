@@ -26,17 +26,8 @@ class ExtremityPathfinder(Rival):
     It asks for polygons that do not touch, so where two blocked cells meet at a corner, that corner
     of the free cells beside it is cut off by 2^-10 of a cell. No shortest path goes there.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    max_vertices
-        The most vertices of its polygons.
-
-    Raises
-    ------
-    UnsuitableMapError
-        When there are more, or paths may cut corners.
+    `max_vertices`: the most vertices of its polygons. Raises `UnsuitableMapError` when there are
+    more, or paths may cut corners.
     """
 
     name = package = "extremitypathfinder"
@@ -77,10 +68,7 @@ Room = tuple["FloatArray", list["FloatArray"]]
 def polygons_of(free: BoolArray, max_vertices: int) -> list[Room]:
     """Return the polygons of the free cells, one for each set that moves join.
 
-    Raises
-    ------
-    UnsuitableMapError
-        When they have too many vertices.
+    Raises `UnsuitableMapError` when they have too many vertices.
     """
     import shapely  # noqa: PLC0415 - half a second, rarely needed
 
@@ -148,19 +136,9 @@ def _rooms_of(free: BoolArray, rooms: list[Room]) -> Any:
 class OmplWhole(Rival):
     """A planner of OMPL on the whole map, without a corridor and without a path of the grid.
 
-    Parameters
-    ----------
-    grid
-        The map.
-    planner, budget_s, seed, simplify, parameters
-        As in section `planner.ompl` of a preset.
-
-    Raises
-    ------
-    OmplError
-        When OMPL is not installed, or its process does not start.
-    UnsuitableMapError
-        When paths may cut corners.
+    `planner`, `budget_s`, `seed`, `simplify`, `parameters`: as in section `planner.ompl` of a
+    preset. Raises `OmplError` when OMPL is not installed, or its process does not start;
+    `UnsuitableMapError` when paths may cut corners.
     """
 
     name, package = "ompl-whole", "ompl"

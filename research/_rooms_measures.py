@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import hybridnav as hn
-from benchmarks.common import print_head, print_row
+from benchmarks.tables import print_head, print_row
 from hybridnav._base.typing import FloatArray, IntArray
 from hybridnav.rooms.find import judged_rooms
 from hybridnav.rooms.listing import kinds_of

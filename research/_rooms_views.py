@@ -11,7 +11,7 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.common import print_head, print_row
+from benchmarks.tables import print_head, print_row
 from hybridnav._base.typing import AnyArray, BoolArray, FloatArray, IntArray
 from hybridnav.rooms import CarriedNames, carry_names
 from hybridnav.rooms.find import judged_rooms

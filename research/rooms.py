@@ -17,7 +17,8 @@ import networkx as nx
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, option, print_head, print_row
+from benchmarks.options import NEEDED_DATA, option
+from benchmarks.tables import print_head, print_row
 from hybridnav.rooms.merging import Forest
 from hybridnav.route import MaxDistanceSearch
 from research._rooms_buildings import SITES, Building

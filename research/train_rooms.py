@@ -16,7 +16,7 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.common import DATA, Refused, option
+from benchmarks.options import DATA, Refused, option
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.rooms import merging
 from hybridnav.rooms.cutting import Ground, fine_segments, least_cells

@@ -13,7 +13,8 @@ import tempfile
 from argparse import Namespace
 from pathlib import Path
 
-from benchmarks.common import ROOT, option
+from benchmarks.common import ROOT
+from benchmarks.options import option
 from tools.wheels import Environment
 
 OLDEST = "numpy==1.26.*"

@@ -14,7 +14,8 @@ import urllib.request
 from argparse import Namespace
 from pathlib import Path
 
-from benchmarks.common import ROOT, option
+from benchmarks.common import ROOT
+from benchmarks.options import option
 from hybridnav._base.files import replace_file
 
 LIST = ROOT / "benchmarks" / "public_maps.tsv"

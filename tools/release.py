@@ -14,7 +14,8 @@ from typing import Any
 import tomllib
 import yaml
 
-from benchmarks.common import ROOT, option
+from benchmarks.common import ROOT
+from benchmarks.options import option
 
 OPTIONS = [
     option("--write", action="store_true", help="write CITATION.cff and codemeta.json"),

@@ -15,7 +15,8 @@ from argparse import Namespace
 from importlib.metadata import distributions
 from pathlib import Path
 
-from benchmarks.common import OFFICE, ROOT, option
+from benchmarks.common import OFFICE, ROOT
+from benchmarks.options import option
 
 ENDS = "--start", "1.0,13.2", "--goal", "40.6,19.4"
 LARGEST = 12

@@ -22,7 +22,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import PLAN, ROOT, Refused, option
+from benchmarks.common import PLAN, ROOT
+from benchmarks.options import Refused, option
 from hybridnav._base.shipped import LEVELS
 
 EXERCISE = (

@@ -44,20 +44,9 @@ Data = dict[str, Any]
 def collect(folder: Path, root: Path, kinds: Mapping[str, str]) -> Data:
     """Return all figures of a study.
 
-    Parameters
-    ----------
-    folder
-        The study's folder, with one of records for each part.
-    root
-        Maps are named by their paths from here.
-    kinds
-        The kind of each map by that name.
-
-    Returns
-    -------
-    dict
-        Of strings, numbers, lists and dicts, as JSON has them: None for a missing figure, "never"
-        for an infinite one.
+    `folder`: the study's folder, with one of records for each part; `root`: maps are named by their
+    paths from here; `kinds`: the kind of each map by that name. Returns strings, numbers, lists
+    and dicts, as JSON has them: None for a missing figure, "never" for an infinite one.
     """
     noted, levels = read_note(folder), folder / LEVELS_FILE
     studies = studies_of(folder, root)

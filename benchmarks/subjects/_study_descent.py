@@ -14,9 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
 import hybridnav as hn
-from benchmarks.common import print_head, print_row, read
+from benchmarks.common import read
 from benchmarks.subjects._study_data import Data
 from benchmarks.subjects._study_maps import StudyMap
+from benchmarks.tables import print_head, print_row
 from hybridnav.harness.scenes import sample_pairs
 from hybridnav.viz import style
 from hybridnav.viz.canvas import new_figure

@@ -198,23 +198,9 @@ def run(  # noqa: PLR0913 - two have defaults
 ) -> None:
     """Answer all that is not answered yet, and note how long it took.
 
-    Parameters
-    ----------
-    maps
-        The maps.
-    folder
-        Gets a folder of records for each part.
-    plan
-        How much to ask.
-    parts
-        The parts to run.
-    workers, scheduler
-        As in `RunSettings`.
-
-    Raises
-    ------
-    InvalidValueError
-        When the folder holds a study that asked otherwise.
+    `folder`: gets a folder of records for each part; `plan`: how much to ask; `parts`: the parts to
+    run; `workers`, `scheduler`: as in `RunSettings`. Raises `InvalidValueError` when the folder
+    holds a study that asked otherwise.
     """
     _check_plan(folder, plan)
     folder.mkdir(parents=True, exist_ok=True)

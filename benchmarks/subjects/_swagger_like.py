@@ -68,20 +68,10 @@ def swagger_like(
 ) -> tuple[LongArray, LongArray]:
     """Return nodes and edges.
 
-    Parameters
-    ----------
-    free
-        bool (rows, cols), the cells that the centre of the robot may enter.
-    skeleton
-        bool (rows, cols), their skeleton.
-    sizes
-        Sides of cells, and the radius by which obstacles have grown.
-
-    Returns
-    -------
-    tuple
-        int64 (n, 2), the cells of the nodes as (row, col), sorted; int64 (m, 2), edges, once for
-        both directions.
+    `free`: bool (rows, cols), the cells that the centre of the robot may enter; `skeleton`: bool
+    (rows, cols), their skeleton; `sizes`: sides of cells, and the radius by which obstacles have
+    grown. Returns int64 (n, 2), the cells of the nodes as (row, col), sorted; int64 (m, 2), edges,
+    once for both directions.
     """
     sight = Sight(free)
     graph: nx.Graph[Cell] = nx.Graph()

@@ -475,14 +475,7 @@ class Lost(Exception):  # noqa: N818 - no error of the program
 class Walker:
     """Somebody who follows sentences.
 
-    Parameters
-    ----------
-    place
-        The map.
-    point
-        Where one begins, metres.
-    stride
-        How much longer one's metre is than a metre.
+    `point`: where one begins, metres; `stride`: how much longer one's metre is than a metre.
     """
 
     def __init__(self, place: Place, point: FloatArray, stride: float = 1.0) -> None:

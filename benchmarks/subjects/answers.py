@@ -23,7 +23,8 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
-from benchmarks.common import DATA, OFFICE, ROOT, option
+from benchmarks.common import OFFICE, ROOT
+from benchmarks.options import DATA, option
 from benchmarks.subjects._study_maps import StudyMap, maps_of
 from hybridnav.cli.app import run
 

@@ -17,7 +17,8 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.common import ROOT, SEED, option
+from benchmarks.common import ROOT
+from benchmarks.options import SEED, option
 
 BUILDING = ROOT / "maps" / "building" / "building.yaml"
 FINISHES = ("none", "line-of-sight", "arcs")

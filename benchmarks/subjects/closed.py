@@ -24,17 +24,9 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
-from benchmarks.common import (
-    DATA,
-    SEED,
-    office_and_maps,
-    option,
-    prepared,
-    print_head,
-    print_row,
-    read,
-    timed,
-)
+from benchmarks.common import office_and_maps, prepared, read, timed
+from benchmarks.options import DATA, MAPS, SEED, option
+from benchmarks.tables import print_head, print_row
 from hybridnav.planning.methods.shortest import OverMesh
 from hybridnav.search.mesh import build_mesh
 
@@ -120,12 +112,7 @@ def measure(name: str, planner: hn.HybridPlanner, *, pairs: int, seed: int) -> N
         print_row(*line)
 
 
-OPTIONS = [
-    DATA,
-    option("--map", action="append", default=[], metavar="GLOB"),
-    option("--pairs", type=int, default=60),
-    SEED,
-]
+OPTIONS = [DATA, MAPS, option("--pairs", type=int, default=60), SEED]
 
 
 def main(given: Namespace) -> None:

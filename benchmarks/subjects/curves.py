@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.common import option
+from benchmarks.options import option
 from hybridnav.refine.curves import Curve, Pose, shortest_curve
 
 Exact = tuple[Decimal, Decimal, Decimal]

@@ -10,7 +10,9 @@ from argparse import Namespace
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, OFFICE, option, print_head, print_load, print_row, read
+from benchmarks.common import OFFICE, read
+from benchmarks.options import NEEDED_DATA, option
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav.maps import CellClass
 
 MAPS = ("bwi_gdc/3/3.yaml", "strands/tsc_y4/tsc_1701.yaml", "fetch_maps/4_26_15.yaml")

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 import hybridnav as hn
-from benchmarks.common import option, print_head, print_load, print_row
+from benchmarks.options import option
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav.ext.live.explore import By, explore, laser_all_round
 
 _WALL, _DEPTH, _LEAST_ROOM, _BIG_ROOM = 2, 4, 10, 24

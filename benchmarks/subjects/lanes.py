@@ -26,7 +26,8 @@ import shapely
 from scipy.spatial import KDTree
 
 import hybridnav as hn
-from benchmarks.common import DATA, OFFICE, matches, option, read
+from benchmarks.common import OFFICE, matches, read
+from benchmarks.options import DATA, option
 from hybridnav._base.typing import FloatArray, LongArray
 from hybridnav.graphs.attach import (
     MANY_CANDIDATES,

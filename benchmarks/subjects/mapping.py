@@ -14,7 +14,9 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, option, print_head, print_row, read
+from benchmarks.common import read
+from benchmarks.options import NEEDED_DATA, option
+from benchmarks.tables import print_head, print_row
 from hybridnav.ext.live.mapping import LaserModel, Mapper
 
 

@@ -29,21 +29,9 @@ import numpy as np
 import yaml
 
 import hybridnav as hn
-from benchmarks.common import (
-    DATA,
-    RADIUS_M,
-    ROOT,
-    SEED,
-    largest_part,
-    office_and_maps,
-    option,
-    prepared,
-    print_head,
-    print_load,
-    print_row,
-    read,
-    timed,
-)
+from benchmarks.common import RADIUS_M, ROOT, largest_part, office_and_maps, prepared, read, timed
+from benchmarks.options import DATA, MAPS, SEED, option
+from benchmarks.tables import print_head, print_load, print_row
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -149,7 +137,7 @@ def measure(
 
 OPTIONS = [
     DATA,
-    option("--map", action="append", default=[], metavar="GLOB"),
+    MAPS,
     option("--preset", action="append", default=[], metavar="NAME"),
     option("--doors", type=int, default=10),
     option("--sets", type=int, default=5),

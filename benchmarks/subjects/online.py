@@ -18,16 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridnav as hn
-from benchmarks.common import (
-    DATA,
-    OFFICE,
-    option,
-    print_head,
-    print_load,
-    print_row,
-    read,
-    with_classes,
-)
+from benchmarks.common import OFFICE, read, with_classes
+from benchmarks.options import DATA, option
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav.ext.live import OnlinePyramid
 from hybridnav.ext.live.mapping import Mapper
 

@@ -17,7 +17,9 @@ from typing import Any
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, RADIUS_M, option, print_head, print_row
+from benchmarks.common import RADIUS_M
+from benchmarks.options import NEEDED_DATA, option
+from benchmarks.tables import print_head, print_row
 from hybridnav.ext.live import OnlineRooms, ReplayFigures, grids_of_scans, replay
 from hybridnav.ext.live.mapping import Mapper
 

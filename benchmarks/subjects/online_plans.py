@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybridnav as hn
-from benchmarks.common import DATA, option, print_head, print_load, print_row, with_classes
+from benchmarks.common import with_classes
+from benchmarks.options import DATA, option
 from benchmarks.subjects.rescore import patched
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav.ext.live import OnlinePyramid
 from hybridnav.search.mesh import build_mesh
 from hybridnav.search.octile import build_jump_graph, contract_graph

@@ -13,25 +13,15 @@ from typing import Any
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import (
-    NEEDED_DATA,
-    OFFICE,
-    SEED,
-    Refused,
-    largest_part,
-    matches,
-    option,
-    print_head,
-    print_load,
-    print_row,
-    read,
-)
+from benchmarks.common import OFFICE, largest_part, matches, read
+from benchmarks.options import MAPS, NEEDED_DATA, SEED, Refused, option
 from benchmarks.rivals import NanoAstar, Networkx, Pyastar2d, RoutingKit, ScikitImage, Scipy, Tcod
 from benchmarks.rivals_any_angle import ExtremityPathfinder
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav._base.moves import path_length_in_cells
 from hybridnav.maps import OccupancyGrid
 
-MAPS = (
+FILES = (
     "nav2/maps/tb3_sandbox.yaml",
     "cob_environments/ipa-apartment/map.yaml",
     "bwi_gdc/3/3.yaml",
@@ -49,7 +39,7 @@ COLUMNS = (
 )
 OPTIONS = (
     NEEDED_DATA,
-    option("--map", action="append", default=[], metavar="GLOB"),
+    MAPS,
     option("--pairs", type=int, default=100),
     option("--repeats", type=int, default=5),
     option("--patience", type=float, default=60.0, help="seconds a planner has for the pairs"),
@@ -160,7 +150,7 @@ def measure(path: Any, given: Namespace) -> None:
 
 def main(given: Namespace) -> None:
     """Print the table."""
-    paths = [OFFICE, *(given.data / name for name in MAPS)]
+    paths = [OFFICE, *(given.data / name for name in FILES)]
     paths = [path for path in paths if not given.map or matches(str(path), given.map)]
     if not paths:
         raise Refused("no map has such a name")

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import OFFICE, option, read
+from benchmarks.common import OFFICE, read
+from benchmarks.options import option
 from hybridnav._base.typing import FloatArray
 from hybridnav.harness.tables import Row, to_markdown
 from hybridnav.maps.clearance import clearance_cells

@@ -31,9 +31,11 @@ import numpy as np
 from scipy import ndimage
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, SEED, option, print_head, print_load, print_row, timed
 from benchmarks.common import read as read_grid
+from benchmarks.common import timed
+from benchmarks.options import MAPS, NEEDED_DATA, SEED, option
 from benchmarks.subjects._study_maps import maps_of
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav import check_proof
 from hybridnav._base.typing import ByteArray, FloatArray
 from hybridnav.errors import HybridNavError
@@ -233,7 +235,7 @@ def row(name: str, every: list[Proof]) -> None:
 
 OPTIONS = [
     NEEDED_DATA,
-    option("--map", action="append", default=[], metavar="GLOB"),
+    MAPS,
     option("--pairs", type=int, default=10, help="pairs a map and preset"),
     option("--planted", type=int, default=1, help="pairs a map and preset with false proofs too"),
     SEED,

@@ -18,8 +18,10 @@ from pathlib import Path
 
 from scipy import ndimage
 
-from benchmarks.common import DATA, matches, option, print_head, print_load, print_row, read, timed
+from benchmarks.common import matches, read, timed
+from benchmarks.options import DATA, option
 from benchmarks.subjects._study_maps import RAW_MAPS, ROS_MAPS
+from benchmarks.tables import print_head, print_load, print_row
 
 TILINGS = ((1, 2), (2, 4), (4, 8), (8, 9), (10, 12))
 VERTICES_PER_TILE = 531_450

@@ -28,8 +28,10 @@ import numpy as np
 import shapely
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, Refused, option, print_head, print_load, print_row, read
+from benchmarks.common import read
+from benchmarks.options import NEEDED_DATA, Refused, option
 from benchmarks.subjects.proofs import is_accepted
+from benchmarks.tables import print_head, print_load, print_row
 from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.maps import ShapeGrids
 from hybridnav.maps.files import load_scenarios

@@ -34,18 +34,9 @@ from typing import Any
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import (
-    FAR_APART,
-    NEEDED_DATA,
-    OFFICE,
-    SEED,
-    largest_part,
-    option,
-    prepared,
-    print_head,
-    print_row,
-    read,
-)
+from benchmarks.common import FAR_APART, OFFICE, largest_part, prepared, read
+from benchmarks.options import NEEDED_DATA, SEED, option
+from benchmarks.tables import print_head, print_row
 from hybridnav._base.typing import ByteArray, FloatArray
 
 TILES = (

@@ -15,8 +15,10 @@ import statistics
 from argparse import Namespace
 from pathlib import Path
 
-from benchmarks.common import NEEDED_DATA, ROOT, Checkout, option, print_head, print_load, print_row
+from benchmarks.common import ROOT, Checkout
+from benchmarks.options import NEEDED_DATA, option
 from benchmarks.subjects._study_maps import maps_of
+from benchmarks.tables import print_head, print_load, print_row
 
 MODES = "warm", "shuffled", "cold"
 REFERENCE, *PRESETS = "grid-astar", "shortest", "octile", "paper"

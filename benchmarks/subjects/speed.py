@@ -19,18 +19,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import (
-    NEEDED_DATA,
-    OFFICE,
-    PLAN,
-    ROOT,
-    Checkout,
-    matches,
-    option,
-    print_head,
-    print_row,
-)
+from benchmarks.common import OFFICE, PLAN, ROOT, Checkout, matches
+from benchmarks.options import NEEDED_DATA, option
 from benchmarks.subjects._study_maps import RAW_MAPS, ROS_MAPS
+from benchmarks.tables import print_head, print_row
 
 LANES = "aws_small_warehouse/002/map.yaml", "fetch_maps/4_26_15.yaml", "bwi_gdc/3ne/3ne.yaml"
 LEAST_CELLS = 1_000_000

@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import OFFICE, PLAN, ROOT, option, prepared, read
+from benchmarks.common import OFFICE, PLAN, ROOT, prepared, read
+from benchmarks.options import option
 from benchmarks.subjects.scale import tile_of
 from benchmarks.worlds import World
 from hybridnav.harness.tables import Row, to_markdown

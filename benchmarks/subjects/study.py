@@ -22,7 +22,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.common import DATA, ROOT, Refused, option
+from benchmarks.common import ROOT
+from benchmarks.options import DATA, MAPS, Refused, option
 from benchmarks.subjects._study_beside import CHART as BESIDE_CHART
 from benchmarks.subjects._study_beside import MAP as BESIDE_MAP
 from benchmarks.subjects._study_beside import plot_beside
@@ -46,16 +47,8 @@ FIGURES = Path("data", "study.json")
 def write_all(folder: Path, root: Path, kinds: Mapping[str, str], docs: Path) -> Data:
     """Write all outputs of the records in a folder, and return the figures.
 
-    Parameters
-    ----------
-    folder
-        The study's folder.
-    root
-        Maps are named by their paths from here.
-    kinds
-        The kind of each map by that name.
-    docs
-        Folder of the page, its charts and its figures.
+    `folder`: the study's folder; `root`: maps are named by their paths from here; `kinds`: the kind
+    of each map by that name; `docs`: folder of the page, its charts and its figures.
     """
     data = collect(folder, root, kinds)
     for made in (docs / FIGURES, docs / "images"):
@@ -88,7 +81,7 @@ OPTIONS = [
     option("--scheduler", metavar="ADDRESS", help="of a dask.distributed cluster"),
     option("--pairs", type=int, help="of each map; else the study's"),
     option("--repeat", type=int, help="queries of each pair; else the study's"),
-    option("--map", action="append", default=[], metavar="GLOB"),
+    MAPS,
     option("--part", choices=("lengths", "costs", "ompl")),
     option("--pages-only", action="store_true", help="from docs/data/study.json"),
     option("--descent", action="store_true", help="the chart of the levels alone, anew"),

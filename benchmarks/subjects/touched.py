@@ -20,7 +20,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import NEEDED_DATA, option, print_head, print_row
+from benchmarks.options import NEEDED_DATA, option
+from benchmarks.tables import print_head, print_row
 
 _CHILD = """
 import os, signal, sys, warnings

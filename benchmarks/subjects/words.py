@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import NEEDED_DATA, SEED, option, print_head, print_row
+from benchmarks.options import NEEDED_DATA, SEED, option
 from benchmarks.subjects._words_walker import Lost, Place, Walker
+from benchmarks.tables import print_head, print_row
 from hybridnav.guide import Tour
 from research._rooms_buildings import Building
 

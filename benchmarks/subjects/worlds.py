@@ -3,7 +3,7 @@
 from argparse import Namespace
 from pathlib import Path
 
-from benchmarks.common import option
+from benchmarks.options import option
 from benchmarks.worlds import figure1_world, office_world, write_world
 
 OPTIONS = [option("folder", type=Path)]

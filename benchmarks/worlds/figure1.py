@@ -20,10 +20,7 @@ def figure1_world() -> World:
     * 3 faces: two protected ones (the obstacle and the wall) and the face between the arc of C and
     the self-loop round it, so that V - E + F = 2.
 
-    Returns
-    -------
-    World
-        0.1 m cells, origin (0, 0).
+    Cells have 0.1 m, the origin is (0, 0).
     """
     row, col = np.indices((30, 40))
     # The line between A and B leans by one cell every four rows: no boundary is a straight one.

@@ -166,16 +166,8 @@ def office_world(*, seed: int = 0) -> World:
     only seen from outside; the hall has pillars, an unexplored island and a way out. The unexplored
     ground outside belongs to the map: 960 x 580 cells, origin (-3, -2) m.
 
-    Parameters
-    ----------
-    seed
-        Seed of the scanner's noise; the floor plan itself is always the same. Equal seeds produce
-        equal bytes.
-
-    Returns
-    -------
-    World
-        Doorways stay clear over at least 0.9 m whatever the noise.
+    `seed`: seed of the scanner's noise; the floor plan itself is always the same. Equal seeds
+    produce equal bytes. Doorways stay clear over at least 0.9 m whatever the noise.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     cells = _painted()

@@ -38,18 +38,10 @@ def glimpse(
 ) -> BoolArray:
     """Return the cells seen from a point through a gap, with an uneven far end.
 
-    Parameters
-    ----------
-    points
-        Cell centres, shape `(rows, cols, 2)`, metres.
-    view
-        Position of the scanner.
-    jambs
-        The endpoints of the gap, the right one as seen from the scanner first.
-    reach_m
-        Reach of the longest beam; the shortest reaches seven tenths of it.
-    rng
-        Generator for the lengths of 24 beams.
+    `points`: cell centres, shape `(rows, cols, 2)`, metres; `view`: position of the scanner;
+    `jambs`: the endpoints of the gap, the right one as seen from the scanner first; `reach_m`:
+    reach of the longest beam; the shortest reaches seven tenths of it; `rng`: generator for the
+    lengths of 24 beams.
     """
     offset = points - np.asarray(view)
     from_right = _cross(np.asarray(jambs[0]) - np.asarray(view), offset)

@@ -28,22 +28,12 @@ _LINK_WALL_CELLS = 2
 class World:
     """A generated map, as in a map_server file.
 
-    Parameters
-    ----------
-    pixels
-        Grey values as in the image file, shape `(rows, cols)`, uint8: the top row, which has the
-        highest y, comes first. 0 is occupied, 205 unexplored, 254 free; copied.
-    frame
-        Resolution and pose of the map; cell (0, 0) is the lower-left pixel.
-    name
-        Name of the map in messages and pictures.
-    free_threshold, occupied_threshold
-        U1 and U2 of the paper: `free_thresh` and `occupied_thresh` of the map file.
-
-    Raises
-    ------
-    InvalidValueError
-        When the pixels are no two-dimensional uint8 array.
+    `pixels`: grey values as in the image file, shape `(rows, cols)`, uint8: the top row, which has
+    the highest y, comes first. 0 is occupied, 205 unexplored, 254 free; copied; `frame`: resolution
+    and pose of the map; cell (0, 0) is the lower-left pixel; `name`: name of the map in messages
+    and pictures; `free_threshold`, `occupied_threshold`: U1 and U2 of the paper: `free_thresh` and
+    `occupied_thresh` of the map file. Raises `InvalidValueError` when the pixels are no
+    two-dimensional uint8 array.
     """
 
     pixels: ByteArray
@@ -65,21 +55,9 @@ class World:
     def grid(self, *, robot_radius_m: float | None = None) -> OccupancyGrid:
         """Return the occupancy grid of the world, with the same classes as its loaded map file.
 
-        Parameters
-        ----------
-        robot_radius_m
-            Radius in metres by which occupied cells are inflated, 0 for a robot that is a point;
-            None as in `OccupancyGrid`.
-
-        Returns
-        -------
-        OccupancyGrid
-            Probabilities `1 - pixel / 255`, row 0 at the lowest y.
-
-        Raises
-        ------
-        InvalidValueError
-            When the radius is negative or not finite.
+        `robot_radius_m`: radius in metres by which occupied cells are inflated, 0 for a robot that
+        is a point; None as in `OccupancyGrid`. Probabilities are `1 - pixel / 255`, row 0 at
+        the lowest y. Raises `InvalidValueError` when the radius is negative or not finite.
         """
         darkness = ((255 - np.arange(256)) / 255).astype(np.float32)
         return OccupancyGrid(
@@ -99,23 +77,10 @@ def tiled(world: World, *, rows: int, cols: int) -> World:
     through walls and unexplored margins, and has walls where it crosses unexplored ground. The
     connected space of all copies is connected.
 
-    Parameters
-    ----------
-    world
-        The world to repeat.
-    rows, cols
-        Number of copies along y and along x, >= 1.
-
-    Returns
-    -------
-    World
-        `rows * cols` times as many cells; the lower-left copy keeps its place in the map frame.
-
-    Raises
-    ------
-    InvalidValueError
-        When a count is below 1, the result would exceed `MAX_CELLS`, or the free space of the
-        world is nowhere a passage wide.
+    `world`: the world to repeat; `rows`, `cols`: number of copies along y and along x, >= 1.
+    The lower-left copy keeps its place in the map frame.
+    Raises `InvalidValueError` when a count is below 1, the result would exceed `MAX_CELLS`, or the
+    free space of the world is nowhere a passage wide.
     """
     if rows < 1 or cols < 1 or rows * cols * world.pixels.size > MAX_CELLS:
         raise InvalidValueError(
@@ -179,24 +144,9 @@ def _nearest_link(pixels: ByteArray, link_cells: int) -> tuple[int, int, int]:
 def write_world(world: World, folder: PathLike, name: str) -> Path:
     """Write a world as a map_server map: `name.pgm` (binary) and `name.yaml`.
 
-    Parameters
-    ----------
-    world
-        The world to write; equal worlds produce equal bytes.
-    folder
-        Target folder, created if it does not exist.
-    name
-        File name without an ending, of letters, digits, `_`, `-` and dots.
-
-    Returns
-    -------
-    Path
-        The YAML file.
-
-    Raises
-    ------
-    InvalidValueError
-        When the name is no plain file name.
+    `world`: the world to write; equal worlds produce equal bytes; `folder`: target folder, created
+    if it does not exist; `name`: file name without an ending, of letters, digits, `_`, `-` and
+    dots. Returns the YAML file. Raises `InvalidValueError` when the name is no plain file name.
     """
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_.-]*", name):
         raise InvalidValueError(

@@ -283,6 +283,7 @@ def figures(target: Path) -> dict[str, float]:
         "functions with a value called found": _names_of_functions()["found"],
         "functions with a value called known": _names_of_functions()["known"],
         "lines of tests": lines_of(ROOT / "tests"),
+        "lines of benchmarks": lines_of(ROOT / "benchmarks"),
     }
 
 

@@ -31,7 +31,8 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 216,
     "functions with a value called known": 135,
-    "lines of tests": 71_543,
+    "lines of tests": 71_346,
+    "lines of benchmarks": 9_400,
 }
 
 BUDGETS = {

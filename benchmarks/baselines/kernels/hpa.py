@@ -228,20 +228,10 @@ def abstract_search(moves, cluster_cells, graph, start, goal, cost_of, previous,
     start and goal to the graph: to the nodes of their clusters, and to each other if a path inside
     one cluster does so.
 
-    Parameters
-    ----------
-    moves
-        uint8 (rows, cols), the legal moves of each cell.
-    cluster_cells
-        Side of a cluster, in cells.
-    graph
-        `AbstractGraph`.
-    start, goal
-        Flat cells.
-    cost_of, previous
-        Work arrays, one entry a node: integer cost and previous node.
-    mark, generation
-        As in `weighted.dijkstra`, by node.
+    `moves`: uint8 (rows, cols), the legal moves of each cell; `cluster_cells`: side of a cluster,
+    in cells; `graph`: `AbstractGraph`; `start`, `goal`: flat cells; `cost_of`, `previous`: work
+    arrays, one entry a node: integer cost and previous node; `mark`, `generation`: as in
+    `weighted.dijkstra`, by node.
     """
     cols = moves.shape[1]
     is_open, is_closed = 2 * generation, 2 * generation + 1

@@ -20,7 +20,7 @@ from hybridnav.pyramid.cracks import find_cracks
 from tests.ext.live.identities import check_identities, run_machine
 from tests.oracle.checks import check_base, check_cap, check_level, check_step, passes
 from tests.oracle.pyramid import Base
-from tests.strategies import class_grids, drawn, examples, occupancy_grid
+from tests.strategies import class_grids, drawn, examples, occupancy_grid, seeds
 
 MOST_CELLS = 900
 
@@ -108,7 +108,7 @@ class Robot(RuleBasedStateMachine):
         classes = self.classes.copy()
         painted = classes[low : high + 1, left : right + 1]
         if noisy:
-            rng = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1)))
+            rng = np.random.default_rng(data.draw(seeds))
             painted[:] = rng.integers(0, 3, painted.shape)
         else:
             painted[:] = kind
