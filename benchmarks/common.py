@@ -81,12 +81,16 @@ def timed(
     return found, best
 
 
+PLAINLY = {key: text for key, text in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+"""The environment in which Python keeps the bytecode of modules, as it does for users."""
+
+
 class Checkout:
     """A process with the sources of one checkout, its `src`, that answers lines of JSON."""
 
     def __init__(self, sources: Path, code: str) -> None:
         paths = os.pathsep.join(map(str, (sources.resolve(), ROOT)))
-        self.env, pipe = {**os.environ, "PYTHONPATH": paths}, subprocess.PIPE
+        self.env, pipe = {**PLAINLY, "PYTHONPATH": paths}, subprocess.PIPE
         command = [sys.executable, "-c", code]
         self.process = subprocess.Popen(command, env=self.env, stdin=pipe, stdout=pipe, text=True)
         self._asks = cast("IO[str]", self.process.stdin)

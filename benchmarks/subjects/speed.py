@@ -77,8 +77,7 @@ class Side(Checkout):
         """Return the processor's seconds of a command, of its own processes too."""
         before = os.times()
         command = [sys.executable, "-m", "hybridnav", *words.split()]
-        env = {**self.env, "PYTHONDONTWRITEBYTECODE": ""}  # as installed, what is parsed is kept
-        run = subprocess.run(command, env=env, cwd=ROOT, capture_output=True, check=False)
+        run = subprocess.run(command, env=self.env, cwd=ROOT, capture_output=True, check=False)
         if run.returncode not in {0, 1}:  # 1: found something
             raise ChildProcessError(run.stderr.decode())
         after = os.times()

@@ -8,7 +8,6 @@ kernel is counted, and files are in the page cache.
 
 import json
 import math
-import os
 import subprocess
 import sys
 import tempfile
@@ -19,15 +18,13 @@ from pathlib import Path
 import numpy as np
 
 import hybridnav as hn
-from benchmarks.common import OFFICE, PLAN, ROOT, prepared, read
+from benchmarks.common import OFFICE, PLAINLY, PLAN, ROOT, prepared, read
 from benchmarks.options import option
 from benchmarks.subjects.scale import tile_of
 from benchmarks.worlds import World
 from hybridnav.harness.tables import Row, to_markdown
 
 FIGURE = ROOT / "maps" / "figure1" / "figure1.yaml"
-PLAINLY = {key: text for key, text in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
-"""The environment in which Python keeps the bytecode of modules, as it does for users."""
 
 _FIRST = """
 import json, sys, time

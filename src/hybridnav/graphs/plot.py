@@ -12,7 +12,7 @@ from hybridnav._base.typing import BoolArray, FloatArray
 from hybridnav.graphs import GraphCheck, RouteGraph
 from hybridnav.maps import OccupancyGrid
 from hybridnav.viz import style
-from hybridnav.viz.canvas import Canvas, View, draw_cells, draw_shades, known_view
+from hybridnav.viz.canvas import Canvas, View, draw_classes, draw_shades, known_view
 from hybridnav.viz.layout import Entry, finish
 from hybridnav.viz.maps import ground_entries
 
@@ -91,7 +91,7 @@ def plot_graph_check(
 
 def _opened(ax: Axes | None, width_in: float, view: View, grid: OccupancyGrid) -> Canvas:
     canvas = Canvas.opened(ax, width_in, view)
-    draw_cells(canvas, grid, grid.classes, style.rgb(style.BLOCKED, style.FREE, style.UNEXPLORED))
+    draw_classes(canvas, grid)
     return canvas
 
 

@@ -61,7 +61,7 @@ class _Work:
     def __init__(self, n_cells: int, weights: _Weights | None = None) -> None:
         weighted = weights is not None
         self.records = np.zeros(n_cells, dtype=np.int64 if weighted else np.uint32)
-        n_buckets = _kernels.BUCKETS if weights is None else weights.given[3]
+        n_buckets = _kernels.BUCKETS if weights is None else weights.n_buckets
         self.waiting = np.empty(n_buckets * _ROOM, dtype=np.int32)
         self.generation = 0
         self._last = _kernels.WIDE_GENERATIONS if weighted else _kernels.GENERATIONS
@@ -89,8 +89,8 @@ class _Weights:
         of_enterable = units[enterable]
         least = int(of_enterable.min(initial=_MOST_UNITS))
         most = int(of_enterable.max(initial=least))
-        buckets = _kernels.bucket_shift(least), _kernels.n_buckets(least, most)
-        self.given = self.units, 2 * least, *buckets
+        self.n_buckets = _kernels.n_buckets(least, most)
+        self.given = self.units, 2 * least, _kernels.bucket_shift(least), self.n_buckets
         """What the kernel takes."""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterable
 from importlib import resources
 from typing import TYPE_CHECKING, Annotated, Any, get_args
@@ -196,11 +195,10 @@ def _rows(report: BuildingGraphReport) -> list[list[str]]:
 
 def _picture(check: GraphCheck, title: str | None) -> str:
     from hybridnav.graphs import plot_graph_check  # noqa: PLC0415 - loads matplotlib
-    from hybridnav.viz.canvas import picture_bytes  # noqa: PLC0415
+    from hybridnav.viz.canvas import picture_bytes, png_uri  # noqa: PLC0415
 
     axes = plot_graph_check(check, width_in=_WIDTH_IN, title=title)
-    drawn = picture_bytes(axes, ".png", dpi=_DPI)
-    return f"data:image/png;base64,{base64.b64encode(drawn).decode('ascii')}"
+    return png_uri(picture_bytes(axes, ".png", dpi=_DPI))
 
 
 def _page(

@@ -187,9 +187,8 @@ def _draw_floor(
     ]
     for number, points in reversed(lines):
         width = (_LINE + 1.6 * min(number, 4)) * canvas.sizes.line
-        line = Line2D(*points.T, color=_colours(plans)[number], linewidth=width, zorder=7)
-        line.set_gid(f"route-{number + 1}")
-        canvas.ax.add_line(line)
+        look = {"color": _colours(plans)[number], "linewidth": width, "zorder": 7}
+        canvas.add_line(points, **look, gid=f"route-{number + 1}")
     drawn = [points for _, points in lines]
     markers = _markers(floor, plans)
     entries, labels = _draw_ground(canvas, floor, drawn, [end.position_m for _, end in ends])

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from hybridnav._base.rows import unique_rows
 from hybridnav._base.typing import ByteArray, IntArray, PathLike
@@ -192,16 +191,9 @@ def _draw_panel(canvas: Canvas, panel: _Panel) -> None:
 
 def _write_rooms(canvas: Canvas, rooms: OnlineRooms) -> None:
     doors = [door for door in rooms.doors.values() if not door.is_gap]
-    dots = Line2D(
-        *np.reshape([door.position for door in doors], (-1, 2)).T,
-        color=style.PATH,
-        marker="o",
-        markersize=2 * DOOR_POINTS * canvas.sizes.line,
-        linestyle="none",
-        zorder=8,
-    )
-    dots.set_gid("doors")
-    canvas.ax.add_line(dots)
+    at = np.reshape([door.position for door in doors], (-1, 2))
+    look = {"color": style.PATH, "marker": "o", "ls": "none", "zorder": 8, "gid": "doors"}
+    canvas.add_line(at, ms=2 * DOOR_POINTS * canvas.sizes.line, **look)
     writer = RoomWriter(canvas, rooms.grid, rooms.labels)
     writer.labels.keep_free([door.position for door in doors], DOOR_POINTS * canvas.sizes.line)
     writer.write_names()

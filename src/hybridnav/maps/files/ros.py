@@ -15,7 +15,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from hybridnav._base.files import printable, replace_file
+from hybridnav._base.files import NewFile, printable
 from hybridnav._base.typing import ByteArray, PathLike
 from hybridnav._base.yaml_file import read_yaml
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError, MapWarning, brief
@@ -441,11 +441,8 @@ def write_ros_map(grid: OccupancyGrid, path: PathLike) -> None:
         f"occupied_thresh: {_decimal(grid.occupied_threshold)}",
         f"free_thresh: {_decimal(grid.free_threshold)}",
     ]
-    try:
-        replace_file(image, b"P5\n%d %d\n255\n" % (cols, rows) + pixels.tobytes())
-        replace_file(target, ("\n".join(lines) + "\n").encode())
-    except OSError as error:
-        raise MapError(f"{where}: cannot write: {error.strerror}") from None
+    NewFile(image, where).write(b"P5\n%d %d\n255\n" % (cols, rows) + pixels.tobytes())
+    NewFile(target, where).write(("\n".join(lines) + "\n").encode())
 
 
 def _decimal(value: float) -> str:

@@ -9,7 +9,7 @@ twice the level at which the edge goes, plus one where it is removed and not con
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import find
+from hybridnav._base.kernels.arrays import find, grow
 from hybridnav.pyramid.kernels.darts import base_sigma, next_at_cell, protect_faces
 
 
@@ -276,7 +276,7 @@ def edges_to_rim(start, inside, field_of, edge_end, level, cols, came):
         ):
             break
         if size + 4 > queue.size:
-            queue = np.concatenate((queue, queue))
+            queue = grow(queue)
         for k in range(4):
             edge, beyond = edge_and_face_beyond(corner, k, cols)
             end = edge_end[edge]

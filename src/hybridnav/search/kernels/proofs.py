@@ -77,9 +77,7 @@ def tree_of(costs, barred, start, goal, limit, moves):
             cost[to_row, to_col] = cost[row, col] + step
             back[to_row, to_col] = (k + 4) & 7
             if size == len(heap):
-                larger = np.empty((2 * size, 2), np.int64)
-                larger[:size] = heap
-                heap = larger
+                heap = grow_rows(heap)
             ahead = _least(to_row - goal[0], to_col - goal[1], moves)
             push(heap, size, cost[to_row, to_col] + ahead, to_row * cols + to_col)
             size += 1

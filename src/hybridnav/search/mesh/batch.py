@@ -10,9 +10,7 @@ import numpy as np
 
 from hybridnav._base.threads import SHARES, cores
 from hybridnav.search.mesh.kernels.queries import ANSWERS_FULL, many
-from hybridnav.search.mesh.kernels.state import (
-    WORK_FULL,
-)
+from hybridnav.search.mesh.kernels.state import WORK_FULL
 from hybridnav.search.mesh.search import NO_LIMIT, SURE, MeshSearch, doubled, rounded_into
 
 if TYPE_CHECKING:

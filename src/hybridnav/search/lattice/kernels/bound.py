@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push, total
+from hybridnav._base.kernels.arrays import grow, grow_rows, pop, push, total
 
 UNITS = 2.0**20
 """Units of a cell in costs, which are rounded down."""
@@ -110,7 +110,7 @@ def costs_over_corners(free, factors, start, goal, most, known):
         if key > most:
             break
         if size + _DOWN.size > heap.shape[0]:
-            heap = np.concatenate((heap, heap))
+            heap = grow_rows(heap)
         for move in range(_DOWN.size):
             to, factor = _move_from(free, factors, at, move)
             if factor == np.inf:

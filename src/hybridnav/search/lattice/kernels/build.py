@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.kernels.arrays import grow, pop, push, total
+from hybridnav._base.kernels.arrays import grow, grow_rows, pop, push, total
 from hybridnav.maps.costs.integral import legal_cost
 
 NO_PART = 255
@@ -311,9 +311,7 @@ def costs_from(edges_of, to, costs, source):
             if whole < reached[to[edge]]:
                 reached[to[edge]] = whole
                 if size == heap.shape[0]:
-                    larger = np.empty((2 * size, 2), np.int64)
-                    larger[:size] = heap
-                    heap = larger
+                    heap = grow_rows(heap)
                 push(heap, size, np.int64(whole * _UNITS), to[edge])
                 size += 1
     return reached.astype(np.float32)

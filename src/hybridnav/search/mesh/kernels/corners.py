@@ -349,8 +349,7 @@ def are_inside(corners, first, begins, touched, triples):
     `corners`, `first`, `begins`: arrays of the mesh; `touched`: int32, numbers of the polygons;
     `triples`: int64 (t, 2), the sum of the three corners of each triangle.
     """
-    inside = np.zeros(len(triples), np.bool_)
+    inside, mesh = np.zeros(len(triples), np.bool_), (corners, first, begins)
     for k in range(len(triples)):
-        mesh = corners, first, begins
         inside[k] = _polygon_with(mesh, touched, 3, triples[k, 0], triples[k, 1]) >= 0
     return inside
