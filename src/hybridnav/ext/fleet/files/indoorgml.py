@@ -21,7 +21,7 @@ from hybridnav._base.trig import dist
 from hybridnav._base.typing import LongArray, PathLike
 from hybridnav._base.yaml_file import read_text
 from hybridnav.errors import InvalidValueError, MapError, MapNotFoundError
-from hybridnav.ext.fleet import Building, BuildingGraph, FloorGraph
+from hybridnav.ext.fleet import BuildingGraph, FloorGraph
 from hybridnav.ext.fleet.files.lif import links_between
 from hybridnav.ext.fleet.files.rmf_read import list_of, mapping_of
 from hybridnav.graphs import WaypointGraph
@@ -34,6 +34,7 @@ from hybridnav.topology import TopologicalMap
 if TYPE_CHECKING:
     import networkx as nx
 
+    from hybridnav.ext.fleet import Building
 
 Point = tuple[float, float]
 Line = list[Point]
@@ -109,6 +110,8 @@ def export_indoorgml(
     >>> export_indoorgml(topology, "figure1.json")
     ()
     """
+    from hybridnav.ext.fleet import Building  # noqa: PLC0415 - readers of graphs need none of it
+
     file = NewFile.named(path, "indoor model", "IndoorGML", (".json",))
     split: list[str] = []
     left_out: list[str] = []
