@@ -1,7 +1,7 @@
 """Floors drawn by rule, with the rooms that a person would name: what one room is.
 
-A straight corridor is one room unless a door parts it. A bay belongs to its hall. What is seen
-through glass is no room.
+A corridor is one room, round its bends too, unless a door parts it. A bay belongs to its hall. What
+is seen through glass is no room.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from research._rooms_buildings import Building
 Box = tuple[float, float, float, float]
 """A rectangle from its least x and y to its greatest, in metres."""
 _WALL_M, _DEPTH_M, _OFFICE_M, _DOOR_M = 0.15, 5.0, 4.0, 0.9
+_LEAST_OFFICE_M = 2.2
 _SEEN_M = 0.3
 """Walls are known to this depth."""
 
@@ -47,6 +48,36 @@ class DrawnFloor:
             doors.append((at, reach[0], at + _DOOR_M, reach[1]))
         return replace(self, rooms=tuple(rooms), doors=tuple(doors))
 
+    def framed(self) -> DrawnFloor:
+        """Return the plan with offices along all walls of its corridor, where they fit."""
+        plan = self
+        for left, low, right, high in self.rooms[0]:
+            for begin, end, wall, side, is_turned in (
+                *((left, right, low, -1, False), (left, right, high, 1, False)),
+                *((low, high, left, -1, True), (low, high, right, 1, True)),
+            ):
+                at = begin
+                while at + _LEAST_OFFICE_M <= end:
+                    one = DrawnFloor(()).with_offices(at, min(end, at + _OFFICE_M), wall, side)
+                    one = one.turned() if is_turned else one
+                    if any(_meet(one.rooms[0][0], box) for room in plan.rooms for box in room):
+                        at += 0.25
+                        continue
+                    plan = replace(plan, rooms=plan.rooms + one.rooms, doors=plan.doors + one.doors)
+                    at += _OFFICE_M
+        return plan
+
+    def turned(self) -> DrawnFloor:
+        """Return the plan with x and y swapped."""
+        rooms = tuple(tuple((b, a, d, c) for a, b, c, d in room) for room in self.rooms)
+        return replace(self, rooms=rooms, doors=tuple((b, a, d, c) for a, b, c, d in self.doors))
+
+
+def _meet(one: Box, other: Box) -> bool:
+    """Return whether less than a wall lies between two boxes."""
+    gaps = (one[0] - other[2], other[0] - one[2], one[1] - other[3], other[1] - one[3])
+    return max(gaps) < _WALL_M - 1e-9
+
 
 def straight(
     width: float, length: float = 24.0, *, parts: int = 1, door: float = 0.0
@@ -59,6 +90,17 @@ def straight(
     doors = [(end - 0.01, low, end + _WALL_M + 0.01, high) for end in ends]
     plan = DrawnFloor(tuple(rooms), tuple(doors))
     return plan.with_offices(0, length, width, 1).with_offices(0, length, 0, -1)
+
+
+def bend(width: float, along: float = 16.0, up: float = 14.0) -> DrawnFloor:
+    """Draw a corridor with a bend, between offices."""
+    return DrawnFloor((((0, 0, along, width), (0, 0, width, up)),)).framed()
+
+
+def crossing(width: float, other: float, *, down: float = 9.0) -> DrawnFloor:
+    """Draw two corridors that cross, between offices; `down` 0 makes a branch of one."""
+    boxes: tuple[Box, ...] = ((-10, 0, other + 10, width), (0, -down, other, width + 9))
+    return DrawnFloor((boxes,)).framed()
 
 
 def hall(count: int, bay: float, deep: float, front: float = 0.0) -> DrawnFloor:

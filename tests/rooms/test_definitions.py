@@ -7,12 +7,15 @@ import pytest
 
 import hybridnav as hn
 from research._rooms_agreement import compare_rooms
-from research._rooms_drawn import drawn, hall, straight
+from research._rooms_drawn import bend, crossing, drawn, hall, straight
 
 WIDTHS_M = (1.6, 2.2, 3.0)
 PLANS = {
     **{f"straight {w}": straight(w) for w in WIDTHS_M},
     **{f"long {w}": straight(w, 48.0) for w in WIDTHS_M},
+    **{f"bend {w}": bend(w) for w in WIDTHS_M},
+    **{f"branch {w}": crossing(w, w, down=0.0) for w in WIDTHS_M},
+    **{f"crossing {w}": crossing(w, w) for w in (1.6, 3.0)},
     **{f"doors of {door} across": straight(3.0, parts=3, door=door) for door in (0.9, 1.0)},
     **{f"bays {bay}": hall(5, bay, 0.8 * bay) for bay in (2.0, 2.5, 3.0)},
 }

@@ -40,7 +40,7 @@ _PASSAGE, _PASSAGE_M = 0.7, 1.5
 _WINDOW_M = 25.0
 _MOST_POINTS = 6000
 _LEAST_WALL_CELLS_M = 8.0
-_MOST_DIRECTIONS = 4
+_MOST_DIRECTIONS = 2
 _APART_RAD = math.radians(8.0)
 _ALIKE_RAD = math.radians(0.8)
 _ABSORBED_RAD = math.radians(1.3)
@@ -48,6 +48,10 @@ _SECOND = 0.35
 _FAINT = 0.05
 """A second direction of a window has at least that share of the sharpness of the first, a direction
 of the map at least that of the strongest."""
+
+
+Directions = list[tuple[float, BoolArray]]
+"""Directions of walls; see `wall_directions`."""
 
 
 def least_cells(least_m2: float, cell_m2: float) -> int:
@@ -128,16 +132,16 @@ def without_noise(kinds: ByteArray, resolution_m: float) -> ByteArray:
     return np.where(alone, np.uint8(Kind.INSIDE), kinds)
 
 
-def fine_segments(ground: Ground) -> IntArray:
+def fine_segments(ground: Ground, directions: Directions | None = None) -> IntArray:
     """Cut free space so finely that hardly any segment lies in two rooms.
 
-    `ground`: what counts as free and as wall. Returns int32 (rows, cols), a segment for each free
-    cell, without gaps from 0, -1 elsewhere and for specks below 0.1 m2 that touch no other free
-    cell.
+    `ground`: what counts as free and as wall; `directions`: those of its walls, if they are known.
+    Returns int32 (rows, cols), a segment for each free cell, without gaps from 0, -1 elsewhere and
+    for specks below 0.1 m2 that touch no other free cell.
     """
     free = ground.free
     least = least_cells(_LEAST_M2, ground.resolution_m * ground.resolution_m)
-    lines: IntArray = _cell_kernels.large_parts(free & ~_gaps(ground), least)
+    lines: IntArray = _cell_kernels.large_parts(free & ~_gaps(ground, directions), least)
     spread(lines, free.view(np.int8) - np.int8(1), free.size)
     taken = free & (lines < 0)
     if taken.any():  # gaps have taken all cells
@@ -165,11 +169,11 @@ def spread(label_of: IntArray, region: AnyArray, most_steps: int) -> None:
     _cell_kernels.grow_labels(label_of, region, queue, len(first), most_steps)
 
 
-def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, BoolArray]]:
+def wall_directions(wall: BoolArray, resolution_m: float) -> Directions:
     """Find the directions of walls, in windows of 25 m that overlap by half.
 
     A direction is the angle at which the projection of the wall cells is sharpest; a window has up
-    to two, 8 degrees apart or more, the map up to four.
+    to two, 8 degrees apart or more, and so has the map.
 
     `wall`: bool (rows, cols); `resolution_m`: side of a cell in metres. Returns an angle from -pi/4
     to pi/4 that turns the rows of the grid into it, and bool (rows, cols), the windows in which
@@ -184,7 +188,7 @@ def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, B
             near = begin + np.flatnonzero((cols[begin:end] >= col) & (cols[begin:end] < col + side))
             cells = np.stack([rows[near] - row, cols[near] - col]) - side / 2
             votes += [(a, s, row, col) for a, s in _directions_of(cells, resolution_m)]
-    found: list[tuple[float, BoolArray]] = []
+    found: Directions = []
     strongest = 0.0
     while votes and len(found) < _MOST_DIRECTIONS:
         angles, scores, rows, cols = np.array(votes).T
@@ -194,13 +198,13 @@ def wall_directions(wall: BoolArray, resolution_m: float) -> list[tuple[float, B
         if support[best] < _FAINT * strongest:
             break
         alike = _apart(angles, angles[best]) < _ALIKE_RAD
-        shifts = _wrapped(angles[alike] - angles[best])
+        shifts = wrapped(angles[alike] - angles[best])
         angle = angles[best] + np.average(shifts, weights=scores[alike])
         taken = _apart(angles, angles[best]) < _ABSORBED_RAD
         within = np.zeros_like(wall)
         for at_row, at_col in zip(rows[taken].astype(int), cols[taken].astype(int), strict=True):
             within[at_row : at_row + side, at_col : at_col + side] = True
-        found.append((float(_wrapped(angle)), within))
+        found.append((float(wrapped(angle)), within))
         votes = [vote for vote, gone in zip(votes, taken.tolist(), strict=True) if not gone]
     return found
 
@@ -227,20 +231,21 @@ def _directions_of(cells: FloatArray, resolution_m: float) -> list[tuple[float, 
     return found
 
 
-def _wrapped(angle_rad: FloatArray) -> FloatArray:
+def wrapped(angle_rad: FloatArray) -> FloatArray:
     """Return angles of crosses, from -pi/4 to pi/4."""
     return (angle_rad + math.pi / 4) % (math.pi / 2) - math.pi / 4
 
 
 def _apart(angle_rad: FloatArray, other_rad: float) -> FloatArray:
-    return np.abs(_wrapped(angle_rad - other_rad))
+    return np.abs(wrapped(angle_rad - other_rad))
 
 
-def _gaps(ground: Ground) -> BoolArray:
+def _gaps(ground: Ground, directions: Directions | None) -> BoolArray:
     """Return the cells of gaps between walls, on lines in each direction of walls, and square to
     it."""
     cut = np.zeros_like(ground.free)
-    directions = wall_directions(ground.wall, ground.resolution_m)
+    if directions is None:
+        directions = wall_directions(ground.wall, ground.resolution_m)
     for turned in (False, True):
         wall, free, found, *windows = (
             _cell_kernels.transposed(mask) if turned else mask

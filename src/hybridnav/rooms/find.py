@@ -6,11 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy import ndimage
 
-from hybridnav._base.typing import BoolArray, ByteArray, FloatArray, IntArray, LongArray
+from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.errors import InvalidValueError
 from hybridnav.maps import NO_ROOM, CellClass, OccupancyGrid, RoomLabels
 from hybridnav.maps.areas import box_of_mask
@@ -27,6 +28,7 @@ from hybridnav.rooms.cutting import (
 from hybridnav.rooms.kernels import cutting as _cell_kernels
 from hybridnav.rooms.merging import (
     Forest,
+    GoesOn,
     Judge,
     JudgedSegments,
     Likely,
@@ -35,6 +37,7 @@ from hybridnav.rooms.merging import (
     grown,
     merge,
 )
+from hybridnav.rooms.views import voted_rooms
 
 Cell = tuple[int, int]
 
@@ -61,7 +64,8 @@ def find_rooms(grid: OccupancyGrid, *, least_area_m2: float = 1.0) -> RoomLabels
 
     Free space is cut finely, along the lines of walls in every local direction and at narrow
     passages. Then a small forest, learnt from people's rooms, judges each boundary by its evidence.
-    Segments merge if both lie in one room.
+    Segments merge if both lie in one room. So it is done in four views of the map, turned against
+    its walls, which vote.
 
     Parameters
     ----------
@@ -125,7 +129,7 @@ def divide_rooms(room_of: IntArray, seeds: Mapping[int, Cell]) -> IntArray:
 
 
 def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> IntArray:
-    """Cut free space finely, and merge the segments by a judge of their boundaries.
+    """Cut free space finely, merge the segments by a judge of their boundaries, and let views vote.
 
     All is done on the known cells alone, in the one of their eight images that `Orientation`
     chooses: equal places have equal rooms, whatever lies round the map and however it is turned.
@@ -143,9 +147,9 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     kinds = without_noise(kinds, grid.resolution_m)
     image = Orientation.of(kinds)
     image = replace(image, swaps=1 - image.swaps, flips=image.flips[::-1])  # longer along columns
-    segments = _segments(image.turned(kinds), grid.resolution_m)
-    merge(segments, _rules(forest.judge, least_area_m2, grid.cell_area_m2))
-    found = image.turned_back(segments.label_of)[margin:-margin, margin:-margin]
+    rules = partial(_rules, forest.judge, least_area_m2)
+    voted = voted_rooms(image.turned(kinds), grid.resolution_m, rules, least_area_m2)
+    found = image.turned_back(voted)[margin:-margin, margin:-margin]
     labels = np.full(grid.shape, NO_ROOM, dtype=np.int32)
     np.copyto(labels[known], found, where=free[known])
     least = least_cells(least_area_m2, grid.cell_area_m2)
@@ -153,17 +157,10 @@ def judged_rooms(grid: OccupancyGrid, forest: Forest, least_area_m2: float) -> I
     return labels
 
 
-def _segments(kinds: ByteArray, resolution_m: float) -> JudgedSegments:
-    """Return the fine segments of some cells; what they are cut with is forgotten."""
-    ground = Ground.of(kinds, resolution_m)
-    return JudgedSegments(fine_segments(ground), ground)
-
-
 def _rules(judge: Judge, least_area_m2: float, cell_m2: float) -> list[Rule]:
-    """Return the rules by which segments become rooms."""
+    """Return the rules by which segments become rooms, but for the least area of a room."""
     specks = least_cells(min(SPECK_M2, least_area_m2), cell_m2)
-    least = least_cells(least_area_m2, cell_m2)
-    return [Small(specks), Likely(judge, LEAST_LIKELY), Small(least)]
+    return [Small(specks), Likely(judge, LEAST_LIKELY), GoesOn(judge)]
 
 
 def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
@@ -274,8 +271,8 @@ def renewed_rooms(
 ) -> IntArray:
     """Find the rooms of some free cells, with the rooms beside them as they are.
 
-    The method is that of `find_rooms`. Each room that stays is one segment from the start. Others
-    may merge with it, so that it grows; two of them never merge.
+    The method is that of `find_rooms` in one view, the map as it is. Each room that stays is one
+    segment from the start. Others may merge with it, so that it grows; two of them never merge.
 
     `grid`: the map, or a window of it; cells count as they were measured; `outside`: bool (rows,
     cols), free cells outside of the building; `room_of`: int32 (rows, cols): the room of free cells
@@ -300,6 +297,7 @@ def renewed_rooms(
     # The numbers of rooms that stay lie below all others, and segments keep the order.
     stays = np.arange(len(np.unique(room_of[room_of >= 0])))
     rules = _rules(_Lasting(segments, before).judge, least_area_m2, grid.cell_area_m2)
+    rules.append(Small(least_cells(least_area_m2, grid.cell_area_m2)))
     merge(segments, [_Apart(rule, stays) for rule in rules])
     known = np.full(segments.n_segments, NO_ROOM, np.int32)
     known[segments.owner_of[stays]] = np.unique(room_of[room_of >= 0])

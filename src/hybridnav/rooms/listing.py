@@ -140,8 +140,9 @@ def kinds_of(
 ) -> tuple[RoomKind | None, ...]:
     """Return the kind of each room, None for one that is just a room.
 
-    Holes of a room are filled first, for furniture makes nothing narrow. The breadth is that of the
-    widest tenth of a room, since alcoves and crossings widen a corridor at a few points.
+    Holes of a room that hold no other one are filled first, for furniture makes nothing narrow. The
+    breadth is that of the widest tenth of a room, since alcoves and crossings widen a corridor at a
+    few points.
 
     `label_of`: int32 (rows, cols), the room of each cell, -1 for none; `is_free`: bool (rows,
     cols), free cells as measured; `resolution_m`: side of a cell in metres.
@@ -154,7 +155,11 @@ def kinds_of(
         if window is None:
             found.append(None)
             continue
-        inside = ndimage.binary_fill_holes(np.pad(label[window] == number, 1))
+        cells = np.pad(label[window], 1, constant_values=-1)
+        own = cells == number
+        hole_of, _ = ndimage.label(ndimage.binary_fill_holes(own) & ~own)
+        has_rooms = np.bincount(hole_of.ravel(), (cells >= 0).ravel()) > 0
+        inside = own | (hole_of > 0) & ~has_rooms[hole_of]
         depths_m = (clearance_cells(~inside)[inside]) * resolution_m
         area_m2 = np.count_nonzero(inside) * (resolution_m * resolution_m)
         broadest_m, breadth_m = 2 * depths_m.max(), 2 * float(np.quantile(depths_m, 0.9))

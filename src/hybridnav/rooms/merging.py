@@ -16,6 +16,7 @@ from hybridnav._base.typing import BoolArray, FloatArray, IntArray, LongArray
 from hybridnav.maps.clearance import within_radius
 from hybridnav.rooms.cutting import Ground, with_beside
 from hybridnav.rooms.kernels import cutting as _cell_kernels
+from hybridnav.rooms.kernels import forest as _forest_kernels
 from hybridnav.rooms.kernels import merging as _merging_kernels
 from hybridnav.rooms.kernels.merging import SegmentState
 
@@ -64,6 +65,16 @@ thick."""
 _JAMB_M = 2.0
 """Length of wall on either side of an opening that is looked at."""
 TABLE = "room_judge.npz"
+_POSSIBLE = (0.25, 0.1)
+"""Least probability, in any corridor and in an even one."""
+_BROADEST_M, _ALIKE, _UNEVEN, _UNNARROWED, _LONG = 4.0, 0.6, 1.8, 0.8, 1.5
+"""A corridor: breadth, breadths of two parts against each other, twice the greatest clearance
+against the breadth, twice that on their opening against the breadth of the narrower part, length in
+breadths. Sums over many cells, for the greatest clearance of a part changes with a speck."""
+_EVEN = (1.45, 0.8)
+"""Less than `_UNEVEN`, and more than `_ALIKE`, in an even corridor."""
+_OPENED = (0.7, 1.5)
+"""Breadth of the widest opening over that of both parts of a corridor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +105,7 @@ class Forest:
 
     def judge(self, _pairs: LongArray, evidence: FloatArray) -> FloatArray:
         """Return the probability that two segments belong to one room, float64 (n,)."""
-        return _merging_kernels.probabilities(
+        return _forest_kernels.probabilities(
             evidence, self.features, self.thresholds, self.leaves, self.base
         )
 
@@ -109,7 +120,7 @@ class JudgedSegments:
     def __init__(self, label_of: IntArray, ground: Ground) -> None:
         self._label_of = label_of
         self.n_segments = int(label_of.max(initial=-1)) + 1
-        self._resolution_m = ground.resolution_m
+        self.resolution_m = ground.resolution_m
         self.state = _state(self._label_of, self.n_segments, ground)
         self.owner_of = np.arange(self.n_segments)
         """int64 (n_segments,), the segment that each one is part of by now."""
@@ -125,9 +136,9 @@ class JudgedSegments:
         _merging_kernels.fill_evidence(
             self.state,
             pairs,
-            self._resolution_m,
-            _EVIDENCE_REACH_M / self._resolution_m,
-            max(1, round(_JAMB_M / self._resolution_m)),
+            self.resolution_m,
+            _EVIDENCE_REACH_M / self.resolution_m,
+            max(1, round(_JAMB_M / self.resolution_m)),
             found,
         )
         return found
@@ -151,10 +162,10 @@ def _state(label_of: IntArray, n: int, ground: Ground) -> SegmentState:
     reaching = grown(label_of, _EVIDENCE_REACH_M / ground.resolution_m)
     measured = _merging_kernels.measure_segments(label_of, reaching, ground.squares, n)
     shapes = _merging_kernels.SegmentShapes(*chain(*measured))
-    pairs, sides, clear = _merging_kernels.sides_between(label_of, ground.squares)
+    pairs, sides, clear = _cell_kernels.sides_between(label_of, ground.squares)
     order, opened, run_begins, run_ends = _runs(pairs, n)
     _, border, border_begins, border_ends = _runs(
-        _merging_kernels.sides_between(reaching, ground.squares)[0], n
+        _cell_kernels.sides_between(reaching, ground.squares)[0], n
     )
     keys = np.union1d(opened, border)
     at, count = np.searchsorted(keys, opened), len(keys)
@@ -249,6 +260,49 @@ class Likely:
             self._likely[pairs] = self._judge(pairs, segments.evidence(pairs))
         may = (state.endpoints[:, 0] >= 0) & (self._likely >= self._least)
         return np.where(may, self._likely, 0.0)
+
+
+class GoesOn:
+    """The rule that two segments merge where a corridor goes on, also round a bend or a crossing.
+
+    The corridor is judged as a whole: both parts and their union are about as broad as the opening
+    between them. The judge of boundaries only has to hold it for possible, since a wall beside a
+    branch looks to it like that beside a door. `judge`: see `Likely`.
+    """
+
+    def __init__(self, judge: Judge) -> None:
+        self._judge = judge
+
+    def ratings(self, segments: JudgedSegments, _grown: LongArray) -> FloatArray:
+        """Return the probability of pairs of one corridor, else 0; see `Rule`."""
+        state = segments.state
+        pairs = np.flatnonzero((state.endpoints[:, 0] >= 0) & (state.open_sides > 0))
+        ends = state.endpoints[pairs]
+        free, squares, peaks = state.free[ends], state.squares[ends], state.peaks[ends]
+        breadths = _breadths(squares, free)
+        joined = _breadths(squares.sum(axis=1), free.sum(axis=1))
+        goes_on = joined * segments.resolution_m < _BROADEST_M
+        goes_on &= 2 * peaks.max(axis=1) < _UNEVEN * joined
+        goes_on &= breadths.min(axis=1) > _ALIKE * breadths.max(axis=1)
+        goes_on &= 2 * state.widest[pairs] > _UNNARROWED * breadths.min(axis=1)
+        goes_on &= (free > _LONG * breadths * breadths).all(axis=1)
+        is_even = 2 * peaks.max(axis=1) < _EVEN[0] * joined
+        is_even &= breadths.min(axis=1) > _EVEN[1] * breadths.max(axis=1)
+        opened = _merging_kernels.widest_openings(state, pairs[goes_on])[:, None]
+        opened = opened / breadths[goes_on]
+        goes_on[goes_on] = ((opened > _OPENED[0]) & (opened < _OPENED[1])).all(axis=1)
+        likely = np.zeros(len(pairs))
+        likely[goes_on] = self._judge(pairs[goes_on], segments.evidence(pairs[goes_on]))
+        likely[likely < np.where(is_even, _POSSIBLE[1], _POSSIBLE[0])] = 0.0
+        ratings = np.zeros(len(state.endpoints))
+        ratings[pairs] = likely
+        return ratings
+
+
+def _breadths(squares: FloatArray, free: FloatArray) -> FloatArray:
+    """Return the breadths of segments, in cells, by their sums of squared clearances and counts of
+    cells: between parallel walls, straight or not, the mean is a twelfth of the breadth squared."""
+    return np.sqrt(12 * squares / free)
 
 
 class Small:

@@ -1,11 +1,12 @@
-"""Kernels over cells: floods, connected parts, cuts along walls, growth and numbers of labels."""
+"""Kernels over cells: floods, connected parts, cuts along walls, growth and numbers of labels, and
+the sides between them."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from hybridnav._base.jit import njit
+from hybridnav._base.jit import guarded, njit
 from hybridnav._base.kernels.arrays import find
 from hybridnav._base.trig import cos, hypot, sin
 
@@ -375,3 +376,32 @@ def cut_along(wall, free, slope, within, lengths, share, cut):
                 if n_free >= share * gap and 2 * n_within >= gap:
                     for c in range(last + 1, col):
                         cut[line + shift[c], c] = True
+
+
+@guarded
+@njit(cache=True, nogil=True)
+def sides_between(label_of, squares):
+    """Find sides between cells of two segments: both segments, middle and direction, clearance."""
+    rows, cols = label_of.shape
+    n = 0
+    for fill in range(2):
+        if fill:
+            pairs = np.empty((n, 2), np.int64)
+            sides = np.empty((n, 3))
+            clear = np.empty(n)
+            n = 0
+        for row in range(rows):
+            for col in range(cols):
+                u = label_of[row, col]
+                if u < 0:
+                    continue
+                for k in range(2):
+                    r, c = row + k, col + 1 - k
+                    if r >= rows or c >= cols or label_of[r, c] < 0 or label_of[r, c] == u:
+                        continue
+                    if fill:
+                        pairs[n] = min(u, label_of[r, c]), max(u, label_of[r, c])
+                        sides[n] = (row + r) / 2 + 0.5, (col + c) / 2 + 0.5, float(k)
+                        clear[n] = math.sqrt(min(squares[row, col], squares[r, c]))
+                    n += 1
+    return pairs, sides, clear

@@ -1,5 +1,5 @@
-"""Kernels of segments of free space: their shapes, the sides between them, merging, the evidence on
-a boundary between two and the forest that judges it."""
+"""Kernels of segments of free space: their shapes, merging, and the evidence on a boundary between
+two."""
 
 import math
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridnav._base.jit import guarded, njit
-from hybridnav._base.trig import atan2, cos, exp, hypot, sin
+from hybridnav._base.trig import atan2, cos, hypot, sin
 
 
 class SegmentState(NamedTuple):
@@ -21,6 +21,8 @@ class SegmentState(NamedTuple):
     """float64 (n,), sides round the cells with their reach."""
     peaks: np.ndarray
     """float64 (n,), greatest clearance."""
+    squares: np.ndarray
+    """float64 (n,), sum of the squares of the clearance of free cells."""
     opened: np.ndarray
     """float64 (n,), sides that are open to other segments."""
     hull_areas: np.ndarray
@@ -131,6 +133,8 @@ class SegmentShapes(NamedTuple):
     """Sides of cells at walls and at other segments."""
     peaks: np.ndarray
     """The greatest clearance."""
+    squares: np.ndarray
+    """Sums of the squares of the clearance."""
     hull_begins: np.ndarray
     """Offsets of the hulls in `hulls`."""
     hull_sizes: np.ndarray
@@ -152,22 +156,24 @@ def measure_segments(label_of, reaching, squares, n):
 
     # Areas and clearance are those of free cells. Shape and rim include the reach into walls, so
     # that segments on both sides of a thin wall touch.
-    free, peaks, rims = np.zeros(n), np.zeros(n), np.zeros(n)
+    free, peaks, rims, sums = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     moments = np.zeros((n, 6))
     low, high = np.full(n, rows), np.full(n, -1)
     for row in range(rows):
         end = 0
         while end < cols:  # a run of cells of one segment
             begin, u = end, reaching[row, end]
-            n_free, top = 0, np.int32(0)
+            n_free, top, total = 0, np.int32(0), 0
             while end < cols and reaching[row, end] == u:
                 if label_of[row, end] >= 0:
                     n_free, top = n_free + 1, max(top, squares[row, end])
+                    total += squares[row, end]
                 end += 1
             if u < 0:
                 continue
             free[u] += n_free
             peaks[u] = max(peaks[u], top)
+            sums[u] += total
             low[u], high[u] = min(low[u], row), row
 
             # Sums, not means: when two segments merge, theirs add up.
@@ -237,39 +243,10 @@ def measure_segments(label_of, reaching, squares, n):
         used += sizes[u]
         diameters[u] = diameter_of(corners, sizes[u])
     return (
-        (free, moments, rims, np.sqrt(peaks)),
+        (free, moments, rims, np.sqrt(peaks), sums),
         (hull_begins, sizes),
         (areas, diameters, hulls[:used]),
     )
-
-
-@guarded
-@njit(cache=True, nogil=True)
-def sides_between(label_of, squares):
-    """Find sides between cells of two segments: both segments, middle and direction, clearance."""
-    rows, cols = label_of.shape
-    n = 0
-    for fill in range(2):
-        if fill:
-            pairs = np.empty((n, 2), np.int64)
-            sides = np.empty((n, 3))
-            clear = np.empty(n)
-            n = 0
-        for row in range(rows):
-            for col in range(cols):
-                u = label_of[row, col]
-                if u < 0:
-                    continue
-                for k in range(2):
-                    r, c = row + k, col + 1 - k
-                    if r >= rows or c >= cols or label_of[r, c] < 0 or label_of[r, c] == u:
-                        continue
-                    if fill:
-                        pairs[n] = min(u, label_of[r, c]), max(u, label_of[r, c])
-                        sides[n] = (row + r) / 2 + 0.5, (col + c) / 2 + 0.5, float(k)
-                        clear[n] = math.sqrt(min(squares[row, col], squares[r, c]))
-                    n += 1
-    return pairs, sides, clear
 
 
 @njit(cache=True, nogil=True)
@@ -318,6 +295,7 @@ def merge_pair(state, pair):
     state.rims[u] += state.rims[v] - 2 * border
     state.free[u] += state.free[v]
     state.moments[u] += state.moments[v]
+    state.squares[u] += state.squares[v]
     state.peaks[u] = max(state.peaks[u], state.peaks[v])
     state.versions[u] += 1
     state.versions[v] = -1
@@ -500,6 +478,42 @@ def opening_of(state, pair, reach, found):
     found[10], found[11], found[12] = min(one, other), max(one, other), arms.mean()
 
 
+@guarded
+@njit(cache=True, nogil=True)
+def widest_openings(state, pairs):
+    """Return the breadth of the widest opening of each pair, float64 (n,), in cells.
+
+    An opening consists of sides that touch: a corridor meets another one at both of its ends.
+    """
+    breadths = np.zeros(len(pairs))
+    for k in range(len(pairs)):
+        n, run = 0, state.head[pairs[k]]
+        sides = np.empty((int(state.open_sides[pairs[k]]), 2))
+        while run >= 0:
+            for i in range(state.run_begins[run], state.run_ends[run]):
+                sides[n] = state.sides[i, :2]
+                n += 1
+            run = state.next_run[run]
+
+        # `order` has the sides of this opening up to `end`, and those that are not met behind it.
+        order, end = np.arange(n), 0
+        while end < n:
+            at, end = end, end + 1
+            low, high = sides[order[at]].copy(), sides[order[at]].copy()
+            while at < end:
+                row, col = sides[order[at]]
+                low[0], high[0] = min(low[0], row), max(high[0], row)
+                low[1], high[1] = min(low[1], col), max(high[1], col)
+                for other in range(end, n):
+                    there = sides[order[other]]
+                    if abs(there[0] - row) <= 1 and abs(there[1] - col) <= 1:
+                        order[end], order[other] = order[other], order[end]
+                        end += 1
+                at += 1
+            breadths[k] = max(breadths[k], hypot(high[0] - low[0], high[1] - low[1]) + 1)
+    return breadths
+
+
 @njit(cache=True, nogil=True)
 def axes_of(moments):
     """Return the elongation of cells, and the angle of their main axis from the rows."""
@@ -580,20 +594,3 @@ def fill_evidence(state, pairs, resolution, reach, jamb, evidence):
         row[36] = width * resolution / max(0.3, 2 * widest * resolution)
         row[37], row[38] = found[8], found[9] * resolution
         row[39], row[40], row[41] = found[10], found[11], found[12]
-
-
-@njit(cache=True, nogil=True)
-def probabilities(evidence, features, thresholds, leaves, base):
-    """Return the probability of each row by a forest of complete trees, stored level by level."""
-    inner = features.shape[1]
-    found = np.empty(len(evidence))
-    for k in range(len(evidence)):
-        total = base
-        for tree in range(len(features)):
-            node = 0
-            while node < inner:
-                right = evidence[k, features[tree, node]] > thresholds[tree, node]
-                node = 2 * node + 1 + right
-            total += leaves[tree, node - inner]
-        found[k] = 1 / (1 + exp(-total))
-    return found

@@ -1,0 +1,83 @@
+"""Kernels that bring cells and labels from one frame of a map to another one."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridnav._base.jit import njit
+
+_ONE = 2.0**32
+"""A cell, in the numbers that positions are."""
+
+
+class ViewFrame(NamedTuple):
+    """A frame of cells that is turned about the middle of the map, and coarser."""
+
+    rows: int
+    """Rows of the frame."""
+    cols: int
+    """Columns of it."""
+    cosine: float
+    """Cosine of the angle by which it is turned."""
+    sine: float
+    """Sine of it."""
+    side: float
+    """Side of its cells, in those of the map."""
+
+
+@njit(cache=True, nogil=True)
+def seen(kinds, frame, n):
+    """Return the kinds of the cells of a frame: wall if one of n x n points in each is, else what
+    half of them are; uint8.
+
+    `kinds`: uint8 (rows, cols) of the map, see `cutting.Kind`; `frame`: a `ViewFrame`.
+    """
+    rows, cols = kinds.shape
+    cells = np.empty((frame.rows, frame.cols), np.uint8)
+    # Positions in 32 bits of whole cells and 32 below them, so that a point is an addition away.
+    step = frame.side / n
+    down, right = int(step * frame.cosine * _ONE), int(step * frame.sine * _ONE)
+    half = n * n + 1 >> 1
+    counts = np.empty(frame.cols, np.uint32)  # a byte for each kind
+    for i in range(frame.rows):
+        counts[:] = 0
+        for k in range(n):
+            y = (i + (k + 0.5) / n - 0.5 * frame.rows) * frame.side
+            x = (0.5 / n - 0.5 * frame.cols) * frame.side
+            row = int((frame.cosine * y + frame.sine * x + 0.5 * rows) * _ONE)
+            col = int((frame.cosine * x - frame.sine * y + 0.5 * cols) * _ONE)
+            for j in range(frame.cols):
+                for _ in range(n):
+                    at_row, at_col = row >> 32, col >> 32
+                    if 0 <= at_row < rows and 0 <= at_col < cols:
+                        counts[j] += np.uint32(1) << np.uint32(8 * kinds[at_row, at_col])
+                    row += right
+                    col += down
+        for j in range(frame.cols):
+            kind = 2 if counts[j] >> 16 & 255 >= half else 1 if counts[j] >> 8 & 255 >= half else 0
+            cells[i, j] = 3 if counts[j] >> 24 > 0 else kind
+    return cells
+
+
+@njit(cache=True, nogil=True)
+def brought(label_of, frame, onto, free):
+    """Return labels of a frame on the free cells of another one, int32; -1 elsewhere.
+
+    `label_of`: int32, of the cells of the `ViewFrame` `frame`; `onto`: the other one; `free`: bool,
+    its free cells.
+    """
+    taken = np.full(free.shape, np.int32(-1), np.int32)
+    # From one frame to the map, and from there to the other one.
+    cosine = frame.cosine * onto.cosine + frame.sine * onto.sine
+    sine = frame.cosine * onto.sine - frame.sine * onto.cosine
+    times = onto.side / frame.side
+    for i in range(onto.rows):
+        y = (i + 0.5 - 0.5 * onto.rows) * times
+        for j in range(onto.cols):
+            if free[i, j]:
+                x = (j + 0.5 - 0.5 * onto.cols) * times
+                row = int(np.floor(cosine * y + sine * x + 0.5 * frame.rows))
+                col = int(np.floor(cosine * x - sine * y + 0.5 * frame.cols))
+                if 0 <= row < frame.rows and 0 <= col < frame.cols:
+                    taken[i, j] = label_of[row, col]
+    return taken
