@@ -1,6 +1,7 @@
 """The frames in which a map is seen, and the vote of the views."""
 
 import math
+import tracemalloc
 from itertools import product
 from typing import Any
 
@@ -39,7 +40,7 @@ def on_map(frame, shape, y, x):
     return math.floor(row), math.floor(col)
 
 
-@tried(60, kinds=KINDS, turn=TURNS, side=st.sampled_from([1.0, 1.7, 2.0, 3.1]))
+@tried(60, kinds=KINDS, turn=TURNS, side=st.sampled_from([1.0, 1.7, 2.0, 3.1, 17.0]))
 def test_a_cell_is_wall_if_one_of_its_points_is_and_else_what_half_of_them_are(kinds, turn, side):
     frame, n = over(kinds.shape, turn, side), math.ceil(side)
     seen = _kernels.seen(kinds, frame, n)
@@ -101,6 +102,21 @@ def test_a_frame_holds_the_whole_map():
     assert frame_over((7, 9), 0.0, 1.0) == ViewFrame(7, 9, 1.0, 0.0, 1.0)
     assert frame_over((7, 9), 0.0, 2.0)[:2] == (4, 5)
     assert frame_over((30, 40), math.radians(30), 1.0)[:2] == (46, 50)
+
+
+def test_a_long_map_is_not_seen_across():
+    """A corridor of 300 m with rooms along it, turned by 45 degrees, would be a square of 210 m."""
+    cells = np.ones((160, 6000), np.float32)
+    cells[2:40, 2:-2] = 0.0
+    cells[42:-2, 2:-2] = np.where(np.arange(5996) % 150 < 146, 0.0, 1.0)
+    for k in range(18):
+        cells[40:42, 60 + k :: 150] = 0.0
+    tracemalloc.start()
+    names = hn.find_rooms(hn.OccupancyGrid(cells, hn.Frame(0.05), robot_radius_m=0)).names
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(names) == 41
+    assert peak < 40 * cells.size
 
 
 @pytest.mark.parametrize("degrees", [8, 23, 41])

@@ -38,6 +38,11 @@ _TURNS_RAD = tuple(math.radians(degrees) for degrees in (0.0, 22.5, 45.0, 67.5))
 _CELL_M = 0.1
 """Side of their cells: four views have about as many as a map of cells of 5 cm. A map of larger
 ones is seen once, as it is."""
+_MOST_POINTS = 100
+"""Points along the side of a cell that are looked at; more than cells of a millimetre have."""
+_MOST_TIMES = 4
+"""Cells of a view over those of the map: a long map that is turned lies in a large square of
+nothing. Up to five times as long as wide, a map has all views."""
 _LEVEL_RAD = math.radians(0.3)
 """Up to it, walls run along the cells of the map."""
 _ATOM_M2 = 0.25
@@ -96,21 +101,24 @@ def _voted_segments(
 ) -> tuple[JudgedSegments, ViewFrame]:
     """Return what half of the views hold for one room, and the frame of its cells."""
     side = max(1.0, _CELL_M / resolution_m)
-    cell_m, n_points = side * resolution_m, math.ceil(side - 1e-9)
+    cell_m, n_points = side * resolution_m, min(_MOST_POINTS, math.ceil(side - 1e-9))
     is_coarse = resolution_m > _CELL_M * (1 + 1e-9)
     level = frame_over(kinds.shape, 0.0, side)
     ground = Ground.of(_kernels.seen(kinds, level, n_points), cell_m)
     walls = wall_directions(ground.wall, cell_m)
     ahead = walls[0][0] if walls and not is_coarse and abs(walls[0][0]) > _LEVEL_RAD else 0.0
+    angles = [ahead + turn for turn in _TURNS_RAD[: 1 if is_coarse else None]]
+    views = [(angle, frame_over(kinds.shape, angle, side)) for angle in angles]
+    most = _MOST_TIMES * level.rows * level.cols
+    views = [view for view in views if view[1].rows * view[1].cols <= most] or [(0.0, level)]
     labels: list[IntArray] = []
-    for turn in _TURNS_RAD[: 1 if is_coarse else None]:
-        frame = frame_over(kinds.shape, ahead + turn, side)
+    for angle, frame in views:
         if frame != level:
             ground = Ground.of(_kernels.seen(kinds, frame, n_points), cell_m)
         if not labels:
             base, first = frame, ground
         segments = JudgedSegments(
-            fine_segments(ground, _turned(walls, ahead + turn, level, frame)), ground
+            fine_segments(ground, _turned(walls, angle, level, frame)), ground
         )
         merge(segments, rules(cell_m * cell_m))
         own = _kernels.brought(segments.label_of, frame, base, first.free)

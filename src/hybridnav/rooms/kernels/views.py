@@ -38,7 +38,7 @@ def seen(kinds, frame, n):
     step = frame.side / n
     down, right = int(step * frame.cosine * _ONE), int(step * frame.sine * _ONE)
     half = n * n + 1 >> 1
-    counts = np.empty(frame.cols, np.uint32)  # a byte for each kind
+    counts = np.empty(frame.cols, np.int64)  # 16 bits for each kind
     for i in range(frame.rows):
         counts[:] = 0
         for k in range(n):
@@ -50,12 +50,18 @@ def seen(kinds, frame, n):
                 for _ in range(n):
                     at_row, at_col = row >> 32, col >> 32
                     if 0 <= at_row < rows and 0 <= at_col < cols:
-                        counts[j] += np.uint32(1) << np.uint32(8 * kinds[at_row, at_col])
+                        counts[j] += 1 << 16 * np.int64(kinds[at_row, at_col])
                     row += right
                     col += down
         for j in range(frame.cols):
-            kind = 2 if counts[j] >> 16 & 255 >= half else 1 if counts[j] >> 8 & 255 >= half else 0
-            cells[i, j] = 3 if counts[j] >> 24 > 0 else kind
+            kind = (
+                2
+                if counts[j] >> 32 & 65535 >= half
+                else 1
+                if counts[j] >> 16 & 65535 >= half
+                else 0
+            )
+            cells[i, j] = 3 if counts[j] >> 48 > 0 else kind
     return cells
 
 
