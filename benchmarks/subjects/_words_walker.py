@@ -13,7 +13,7 @@ import itertools
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -490,6 +490,8 @@ class Walker:
         """Follow sentences to the end; return the name of the room that one has come to."""
         for sentence in sentences:
             step = read(sentence, language)
+            if language == "en" and step.into is None and self._is_readable(step.into_kind):
+                step = replace(step, into=step.into_kind)  # "the hall", and a sign says "hall"
             if step.kind == "start":
                 self._start(step)
             elif step.kind == "turn":
@@ -669,7 +671,8 @@ class Walker:
                 passed += is_alike
                 is_there = past == step.past and passed == step.ordinal
                 if step.far_m is not None:
-                    near_m, far_m = self._window(step.far_m, slack_m=0.5)
+                    # Nobody comes to the wall opposite a door within half a metre.
+                    near_m, far_m = self._window(step.far_m)[0], self._window(step.far_m, 0.5)[1]
                     is_there = near_m <= self._walked_m(trail) <= far_m
                 for door in here:
                     is_meant = is_there and is_alike and self._is_meant(door, step)
@@ -698,10 +701,12 @@ class Walker:
     def _walked_m(trail: Sequence[FloatArray]) -> float:
         """Return how far one has walked who cuts the corners of what is less than a stride."""
         kept = [trail[0]]
-        for point in (*trail[1:], trail[-1]):
+        for point in trail[1:]:
             if math.dist(point, kept[-1]) >= 2 * _STEP_M:
                 kept.append(point)
-        return sum(math.dist(one, other) for one, other in itertools.pairwise(kept))
+        return math.dist(kept[-1], trail[-1]) + sum(
+            math.dist(one, other) for one, other in itertools.pairwise(kept)
+        )
 
     def _turn_back_to(self, door: Seen) -> None:
         """Go to a door and look from it into the room."""

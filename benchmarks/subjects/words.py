@@ -55,7 +55,8 @@ def corrupted(words: Sequence[str], how: str) -> list[str]:
     """Return English sentences with hands swapped, or with other numbers."""
     others = {"left": "right", "right": "left"}
     if how == "numbers":
-        others = {"first": "third", "second": "first", "third": "fifth", "nearest": "third nearest"}
+        others = {"first": "third", "second": "first", "third": "fifth", "fourth": "second"}
+        others |= {"fifth": "second", "nearest": "third nearest"}
     pattern = re.compile(rf"\b({'|'.join(others)})\b|(after|for about) (\d+) m")
 
     def other(found: re.Match[str]) -> str:

@@ -25,7 +25,11 @@ def test_walkers_arrive_by_words_alone(walks, language):
 def test_few_walkers_arrive_by_other_words(walks):
     place, tours = walks
     for how in ("hands", "numbers"):
-        lost = [failure(place, tour, corrupted(tour.words(), how)) for tour in tours]
+        others = [(tour, corrupted(tour.words(), how)) for tour in tours]
+        # Nobody gets lost by the metres of the last sentence, inside the goal.
+        others = [(tour, words) for tour, words in others if words[:-1] != tour.words()[:-1]]
+        assert len(others) >= 12, how
+        lost = [failure(place, tour, words) for tour, words in others]
         assert sum(why is None for why in lost) <= 3, how
 
 
@@ -49,7 +53,7 @@ def test_openings_have_no_numbers_and_nobody_counts_past_five(walks):
 
 
 @pytest.mark.parametrize("language", ["en", "de"])
-def test_the_metres_along_the_wall_opposite_lead_to_the_door(language):
+def test_the_metres_along_a_wall_lead_to_the_door(language):
     """Two doors of a wall may lead to one corridor: the metres tell which is meant."""
     grid = read(OFFICE)
     rooms = hn.load_rooms(OFFICE.parents[1] / "building" / "rooms-1.yaml", grid)
@@ -57,13 +61,14 @@ def test_the_metres_along_the_wall_opposite_lead_to_the_door(language):
     place = Place(planner.topology)
     ways = {
         "reception": ("seminar room", "lift lobby", "office 4"),
-        "stairwell": ("office 2", "lift lobby"),
-        "lift lobby": ("stairwell", "seminar room"),
+        "stairwell": ("office 2",),
+        "lift lobby": ("seminar room",),
         "seminar room": ("office 1", "office 2"),
         "office 5": ("stairwell",),
     }
     for name, others in ways.items():
         for other in others:
             tour = hn.plan_tour(planner, [name, other], at="point")
-            assert any("opposite wall" in line and "about" in line for line in tour.words())
+            where = "opposite wall" if name == "reception" else "wall on the"
+            assert any(where in line for line in tour.words() if "for about" in line)
             assert failure(place, tour, tour.words(language), language) is None

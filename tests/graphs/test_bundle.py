@@ -386,9 +386,9 @@ def test_what_is_no_mask_of_a_bundle_is_refused(tmp_path):
 
 
 MAPS = (
-    ("fetch_maps/9_16_15_keepout.yaml", 10),
+    ("fetch_maps/9_16_15_keepout.yaml", 9),
     ("aws_small_house/map.yaml", 1),
-    ("bwi_mapper/intel.yaml", 3),
+    ("bwi_mapper/intel.yaml", 4),
     ("giraff_homes/UMA_236.yaml", 0),
 )
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.maps import CellClass
@@ -102,13 +103,16 @@ def test_rooms_reach_into_what_is_unexplored_on_their_side():
     assert label_of[36, 36] == -1
 
 
-@given(classes=class_grids())
-def test_rooms_of_any_map_hold_free_cells_of_one_connected_part(classes):
-    grid = occupancy_grid(classes, resolution_m=0.25)
+@given(classes=class_grids(), side=st.sampled_from([1, 3]))
+def test_rooms_of_any_map_hold_free_cells_of_one_connected_part(classes, side):
+    """One view, or four of cells of 0.08 m, in which what hangs together may be two parts."""
+    classes = np.kron(classes, np.ones((side, side), np.uint8))
+    grid = occupancy_grid(classes, resolution_m=0.25 / side)
     rooms = hn.find_rooms(grid, least_area_m2=0.2)
-    free = grid.measured == CellClass.FREE
-    counts = np.bincount(rooms.label_of[free & (rooms.label_of >= 0)], minlength=len(rooms.names))
-    assert (counts >= 4).all()
+    label_of = np.where(grid.measured == CellClass.FREE, rooms.label_of, -1)
+    for number in range(len(rooms.names)):
+        assert ndimage.label(label_of == number)[1] == 1
+        assert np.count_nonzero(label_of == number) * grid.cell_area_m2 >= 0.2
     again = hn.find_rooms(grid, least_area_m2=0.2)
     assert (again.label_of == rooms.label_of).all()
 

@@ -43,6 +43,23 @@ def test_furniture_makes_no_corridor_of_a_hall_and_no_room_of_a_hall() -> None:
     assert kind.confidence == pytest.approx(1 - 0.5 * 90 / 120)
 
 
+@pytest.mark.parametrize("label_inside", [1, -1])
+def test_a_ring_round_rooms_is_a_corridor_whether_they_have_names_or_not(label_inside) -> None:
+    label = np.zeros((200, 200), dtype=np.int32)
+    label[20:180, 20:180] = -1
+    label[22:178, 22:178] = label_inside
+    is_free = np.ones(label.shape, np.bool_)
+    is_free[20:180, 20:180] = False
+    is_free[22:178, 22:178] = True
+    kind = kinds_of(label, is_free, 0.1)[0]
+    assert kind is not None
+    assert kind.name == "corridor"
+    is_free[:] = label == 0  # a block of furniture, or what nobody has seen
+    kind = kinds_of(np.where(is_free, 0, -1), is_free, 0.1)[0]
+    assert kind is not None
+    assert kind.name == "hall"
+
+
 def test_the_kind_is_the_same_turned_and_mirrored() -> None:
     rng = np.random.default_rng(0)
     label = np.zeros((30, 200), dtype=np.int32)

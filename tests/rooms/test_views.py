@@ -75,6 +75,44 @@ def test_labels_go_from_one_frame_to_another_by_the_middles_of_cells(labels, tur
         assert brought[i, j] == (label_of[at] if is_inside and free[i, j] else -1)
 
 
+@tried(
+    60, labels=hnp.arrays(np.int32, SHAPES, elements=st.integers(-1, 2)), reach=st.integers(1, 2)
+)
+def test_a_cell_at_a_border_takes_the_label_beside_it_that_most_cells_round_it_have(labels, reach):
+    smooth = _kernels.smoothed(labels, reach)
+    for row, col in np.ndindex(*labels.shape):
+        own, round_it = labels[row, col], []
+        for down, right in product(range(-reach, reach + 1), repeat=2):
+            pair = [(row + down, col + right), (row - down, col - right)]
+            if all(0 <= r < len(labels) and 0 <= c < labels.shape[1] for r, c in pair):
+                one, other = (labels[at] for at in pair)
+                round_it += [one] if one >= 0 and other >= 0 else []
+        near = [(row, col + 1), (row + 1, col), (row, col - 1), (row - 1, col), (row, col)]
+        beside = {
+            int(labels[r, c])
+            for r, c in near
+            if 0 <= r < len(labels) and 0 <= c < labels.shape[1] and labels[r, c] >= 0
+        }
+        most = max((round_it.count(label) for label in beside), default=0)
+        assert smooth[row, col] == own or round_it.count(own) < most
+        if own >= 0:
+            assert round_it.count(smooth[row, col]) == most
+        else:
+            assert smooth[row, col] == -1
+
+
+def test_a_straight_border_stays_where_it_is_and_its_steps_go():
+    labels = np.zeros((12, 9), np.int32)
+    labels[6:] = 1
+    assert (_kernels.smoothed(labels, 2) == labels).all()
+    labels[:, :2] = labels[:, 7:] = -1  # between two jambs
+    assert (_kernels.smoothed(labels, 2) == labels).all()
+    for step in (np.s_[5, 4], np.s_[6, 4]):
+        stepped = labels.copy()
+        stepped[step] = 1 - labels[step]
+        assert (_kernels.smoothed(stepped, 2) == labels).all()
+
+
 @tried(30, data=st.data(), n_views=st.integers(1, 4))
 def test_segments_join_by_the_mean_over_the_pairs_of_their_cells(data, n_views):
     shape = 3, 8

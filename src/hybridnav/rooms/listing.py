@@ -109,6 +109,8 @@ WIDEST_CORRIDOR_M = 4.0
 """Breadth above which nothing is a corridor, in metres."""
 _LONG = 4.0
 """Length of a corridor, in breadths."""
+_LEAST_SPACE_M2 = 1.0
+"""Free space of no room in a hole of one, that is space beyond walls and no furniture."""
 _NARROWEST_M = 1.2
 """Mean width below which a long room is a ray of a scan, in metres."""
 _SMOOTH = 0.62
@@ -140,7 +142,8 @@ def kinds_of(
 ) -> tuple[RoomKind | None, ...]:
     """Return the kind of each room, None for one that is just a room.
 
-    Holes of a room that hold no other one are filled first, for furniture makes nothing narrow. The
+    Holes of a room that hold no other one, and no free space to stand in, are filled first, for
+    furniture makes nothing narrow. The
     breadth is that of the widest tenth of a room, since alcoves and crossings widen a corridor at a
     few points.
 
@@ -158,7 +161,11 @@ def kinds_of(
         cells = np.pad(label[window], 1, constant_values=-1)
         own = cells == number
         hole_of, _ = ndimage.label(ndimage.binary_fill_holes(own) & ~own)
+        space = np.pad(is_free[window], 1) & ~own
         has_rooms = np.bincount(hole_of.ravel(), (cells >= 0).ravel()) > 0
+        has_rooms |= (
+            np.bincount(hole_of.ravel(), space.ravel()) * resolution_m**2 >= _LEAST_SPACE_M2
+        )
         inside = own | (hole_of > 0) & ~has_rooms[hole_of]
         depths_m = (clearance_cells(~inside)[inside]) * resolution_m
         area_m2 = np.count_nonzero(inside) * (resolution_m * resolution_m)

@@ -49,6 +49,9 @@ _ATOM_M2 = 0.25
 """Below it, what all views hold for one room goes to a neighbour before the vote."""
 _HALF = 0.5 - 1e-9
 """Share of the views from which on two segments are one room; shares are rounded."""
+_ROUND = 2
+"""Cells to each side of one on a border that say which room it is in: views cut at angles of their
+own, and without it borders have steps."""
 _STEPS = 6
 """Cells that labels spread where another view sees a wall."""
 
@@ -79,21 +82,23 @@ def voted_rooms(
     joined, base = _voted_segments(kinds, resolution_m, rules, min(_ATOM_M2, least_m2))
     free = kinds == Kind.INSIDE
     whole = frame_over(kinds.shape, 0.0, 1.0)
-    room_of = _kernels.brought(joined.label_of, base, whole, free)
+    room_of = _kernels.brought(_kernels.smoothed(joined.label_of, _ROUND), base, whole, free)
     spread(room_of, free.view(np.int8) - np.int8(1), free.size)
     # What is small is small on the map itself.
     areas = np.zeros(joined.n_segments + 1, np.int64)
     for row in room_of:  # an array of all cells takes eight bytes more for each
         areas += np.bincount(row + 1, minlength=len(areas))
     joined.state.free[:] = areas[1:]
-    merge(joined, [Small(least_cells(least_m2, resolution_m * resolution_m))])
+    least = least_cells(least_m2, resolution_m * resolution_m)
+    merge(joined, [Small(least)])
     owner_of = np.append(joined.owner_of, NO_ROOM).astype(np.int32)
     for row in room_of:
         row[:] = owner_of[row]
-    # What is too narrow for coarse cells.
-    left = free & (room_of < 0)
-    room_of[left] = _cell_kernels.large_parts(left, 1)[left] + np.int32(joined.n_segments)
-    return room_of
+    # What is too narrow for coarse cells, and what hangs together in them alone.
+    room_of[_cell_kernels.large_parts(room_of, least, NO_ROOM) < 0] = NO_ROOM
+    spread(room_of, free.view(np.int8) - np.int8(1), free.size)
+    room_of[free & (room_of < 0)] = np.int32(joined.n_segments)
+    return _cell_kernels.large_parts(room_of, least, NO_ROOM)
 
 
 def _voted_segments(

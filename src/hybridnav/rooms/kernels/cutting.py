@@ -12,18 +12,21 @@ from hybridnav._base.trig import cos, hypot, sin
 
 
 @njit(cache=True, nogil=True)
-def large_parts(mask, least):
-    """Number the parts of a mask, connected along sides, of at least some cells, in the order of
-    their first cells; int32 (rows, cols), -1 elsewhere."""
-    rows, cols = mask.shape
+def large_parts(cells, least, none=0):
+    """Number the parts of equal cells, connected along sides, of at least some cells, in the order
+    of their first cells; int32 (rows, cols), -1 elsewhere.
+
+    `cells`: a mask, or labels; `none`: what cells are that belong to no part.
+    """
+    rows, cols = cells.shape
     n_runs = 0
     for row in range(rows):
-        n_runs += mask[row, 0]
+        n_runs += cells[row, 0] != none
         for col in range(1, cols):
-            n_runs += mask[row, col] > mask[row, col - 1]
+            n_runs += cells[row, col] != none and cells[row, col] != cells[row, col - 1]
     part_of = np.full((rows, cols), np.int32(-1), np.int32)
     root, areas = np.arange(n_runs), np.zeros(n_runs, np.int64)
-    join_runs(mask, part_of, root, areas)
+    join_runs(cells, none, part_of, root, areas)
 
     # The root of a run is one before it, so that one pass finds all roots.
     number = np.full(n_runs, np.int32(-1), np.int32)
@@ -45,22 +48,22 @@ def large_parts(mask, least):
 
 
 @njit(cache=True, nogil=True)
-def join_runs(mask, part_of, root, areas):
-    """Number the runs of a mask along rows, count their cells, and give those that touch one root,
-    the first of them."""
+def join_runs(cells, none, part_of, root, areas):
+    """Number the runs of equal cells along rows, count their cells, and give those that touch one
+    root, the first of them."""
     run = -1
-    for row in range(mask.shape[0]):
-        is_in = was_joined = False
-        for col in range(mask.shape[1]):
-            if not mask[row, col]:
-                is_in = was_joined = False
+    for row in range(cells.shape[0]):
+        was_joined = False
+        for col in range(cells.shape[1]):
+            here = cells[row, col]
+            if here == none:
                 continue
-            if not is_in:
+            if col == 0 or cells[row, col - 1] != here:
                 run += 1
-                is_in = True
+                was_joined = False
             part_of[row, col] = run
             areas[run] += 1
-            is_joined = row > 0 and mask[row - 1, col]
+            is_joined = row > 0 and cells[row - 1, col] == here
             if is_joined and not was_joined:
                 one, other = find(root, np.int64(part_of[row - 1, col])), find(root, run)
                 root[max(one, other)] = min(one, other)

@@ -87,3 +87,43 @@ def brought(label_of, frame, onto, free):
                 if 0 <= row < frame.rows and 0 <= col < frame.cols:
                     taken[i, j] = label_of[row, col]
     return taken
+
+
+@njit(cache=True, nogil=True)
+def smoothed(label_of, reach):
+    """Return labels with smooth borders, int32: a cell at a border takes the label beside it that
+    most cells round it have.
+
+    Cells are counted in pairs that lie opposite each other and both have labels, so that a border
+    stays where it is beside a wall. `label_of`: int32 (rows, cols), -1 for none; `reach`: cells to
+    each side that are counted.
+    """
+    rows, cols = label_of.shape
+    taken = label_of.copy()
+    for row in range(rows):
+        for col in range(cols):
+            own = label_of[row, col]
+            if own < 0:
+                continue
+            best, most = own, -1
+            for step in ((0, 1), (1, 0), (0, -1), (-1, 0)):
+                r, c = row + step[0], col + step[1]
+                if not (0 <= r < rows and 0 <= c < cols):
+                    continue
+                other = label_of[r, c]
+                if other < 0 or other == own:
+                    continue
+                n_own = n_other = 0
+                high = min(reach, row, rows - 1 - row)
+                wide = min(reach, col, cols - 1 - col)
+                for down in range(-high, high + 1):
+                    for right in range(-wide, wide + 1):
+                        label = label_of[row + down, col + right]
+                        if label >= 0 and label_of[row - down, col - right] >= 0:
+                            n_own += label == own
+                            n_other += label == other
+                most = max(most, n_own)
+                if n_other > most:
+                    best, most = other, n_other
+            taken[row, col] = best
+    return taken
