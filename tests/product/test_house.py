@@ -14,8 +14,8 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_369,
-    "lines": 103_050,
+    "code": 65_365,
+    "lines": 103_046,
     "files": 441,
     "code outside ext": 50_409,
     "lines of a file, most": 600,
@@ -40,7 +40,7 @@ BUDGETS = {
     "cli": (3827, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),
-    "ext/fleet": (10202, 8),
+    "ext/fleet": (10198, 8),
     "ext/live": (7613, 8),
     "ext/page": (3208, 7),
     "graphs": (6485, 6),
