@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_365,
-    "lines": 103_046,
+    "code": 65_366,
+    "lines": 103_047,
     "files": 441,
-    "code outside ext": 50_409,
+    "code outside ext": 50_410,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -31,7 +31,7 @@ LIMITS = {
     "parameters of commands, shared ones once": 126,
     "functions with a value called found": 216,
     "functions with a value called known": 135,
-    "lines of tests": 71_539,
+    "lines of tests": 71_550,
     "lines of benchmarks": 9_406,
 }
 
@@ -52,7 +52,7 @@ BUDGETS = {
     "pyramid": (4307, 9),
     "reasons": (1176, 6),
     "refine": (6023, 9),
-    "rooms": (5974, 9),
+    "rooms": (5975, 9),
     "route": (1031, 6),
     "search": (12427, 8),
     "topology": (694, 6),

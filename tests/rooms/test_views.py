@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from scipy import ndimage
 
 import hybridnav as hn
 from hybridnav.rooms.cutting import Ground, Kind
@@ -140,6 +141,16 @@ def test_a_frame_holds_the_whole_map():
     assert frame_over((7, 9), 0.0, 1.0) == ViewFrame(7, 9, 1.0, 0.0, 1.0)
     assert frame_over((7, 9), 0.0, 2.0)[:2] == (4, 5)
     assert frame_over((30, 40), math.radians(30), 1.0)[:2] == (46, 50)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1, 0.4])
+def test_a_map_that_is_seen_once_may_fall_into_hundreds_of_segments(share):
+    cells = (np.random.default_rng(2).random((3, 3000)) < share).astype(np.float32)
+    grid = hn.OccupancyGrid(cells, hn.Frame(0.25), robot_radius_m=0)
+    label_of = np.where(cells == 0, hn.find_rooms(grid, least_area_m2=0.3).label_of, -1)
+    free_parts, _ = ndimage.label(cells == 0)
+    areas = np.bincount(free_parts.ravel())
+    assert (label_of[(cells == 0) & (areas[free_parts] >= 5)] >= 0).all()
 
 
 def test_a_long_map_is_not_seen_across():

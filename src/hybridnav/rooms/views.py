@@ -94,11 +94,12 @@ def voted_rooms(
     owner_of = np.append(joined.owner_of, NO_ROOM).astype(np.int32)
     for row in room_of:
         row[:] = owner_of[row]
-    # What is too narrow for coarse cells, and what hangs together in them alone.
-    room_of[_cell_kernels.large_parts(room_of, least, NO_ROOM) < 0] = NO_ROOM
-    spread(room_of, free.view(np.int8) - np.int8(1), free.size)
-    room_of[free & (room_of < 0)] = np.int32(joined.n_segments)
-    return _cell_kernels.large_parts(room_of, least, NO_ROOM)
+    # What hangs together in coarse cells alone, and what is too narrow for them.
+    part_of: IntArray = _cell_kernels.large_parts(room_of, least, NO_ROOM)
+    spread(part_of, free.view(np.int8) - np.int8(1), free.size)
+    left = free & (part_of < 0)
+    part_of[left] = _cell_kernels.large_parts(left, 1)[left] + np.int32(part_of.max() + 1)
+    return part_of
 
 
 def _voted_segments(
@@ -130,7 +131,7 @@ def _voted_segments(
         spread(own, first.free.view(np.int8) - np.int8(1), _STEPS)
         labels.append(own)
     atoms = labels[0].copy()
-    for own in labels[1:]:
+    for own in labels:  # the first too: its numbers have gaps
         _cell_kernels.cross(atoms, own)
     voted = JudgedSegments(atoms, first)
     merge(voted, [Small(least_cells(atom_m2, cell_m * cell_m)), Voted(atoms, labels)])
