@@ -145,7 +145,7 @@ def update(root: Path, quotes: tuple[Quote, ...], figures: Mapping[str, str]) ->
 
 
 _ANSWERS = "by scipy or by another method, "
-_SOBERING = "{paper_octile} % longer than the octile optimum in the mean "
+
 
 QUOTES = (
     Quote("README.md", "[{maps} public maps](docs/study.md) {contradictions} of {checks} answers"),
@@ -171,13 +171,6 @@ QUOTES = (
         "itself, {ompl_least} to {ompl_most} % mean loss",
     ),
     Quote(
-        "docs/peers.md",
-        _SOBERING + "on the study's maps. It is {paper_any} % longer than the any-angle one (the "
-        "octile optimum itself is {grid_any} % longer), and {paper_means} than our A\\* "
-        "by mean times",
-    ),
-    Quote("docs/harness.md", "asks all methods on {maps} public maps"),
-    Quote(
         "docs/howto/choose-preset.md",
         "{paper_octile} % longer than the octile optimum in the mean, {paper_any} % longer",
     ),
@@ -188,8 +181,8 @@ QUOTES = (
     ),
     Quote(
         "paper/paper.md",
-        _SOBERING + "and {paper_any} % longer than the any-angle optimum; the octile optimum "
-        "itself is {grid_any} % longer",
+        "{paper_octile} % longer than the octile optimum in the mean and {paper_any} % longer than "
+        "the any-angle optimum; the octile optimum itself is {grid_any} % longer",
     ),
     Quote(
         "paper/paper.md",

@@ -32,7 +32,7 @@ LIMITS = {
     "functions with a value called found": 216,
     "functions with a value called known": 135,
     "lines of tests": 71_550,
-    "lines of benchmarks": 9_406,
+    "lines of benchmarks": 9_399,
 }
 
 BUDGETS = {
