@@ -14,10 +14,10 @@ from tests.product.house import (
 )
 
 LIMITS = {
-    "code": 65_366,
-    "lines": 103_047,
+    "code": 65_363,
+    "lines": 103_044,
     "files": 441,
-    "code outside ext": 50_410,
+    "code outside ext": 50_412,
     "lines of a file, most": 600,
     "packages": 18,
     "arrows between packages": 125,
@@ -40,7 +40,7 @@ BUDGETS = {
     "cli": (3827, 6),
     "closures": (1625, 6),
     "ext/agent": (2043, 6),
-    "ext/fleet": (10198, 8),
+    "ext/fleet": (10193, 8),
     "ext/live": (7613, 8),
     "ext/page": (3208, 7),
     "graphs": (6485, 6),
@@ -52,7 +52,7 @@ BUDGETS = {
     "pyramid": (4307, 9),
     "reasons": (1176, 6),
     "refine": (6023, 9),
-    "rooms": (5975, 9),
+    "rooms": (5977, 9),
     "route": (1031, 6),
     "search": (12427, 8),
     "topology": (694, 6),

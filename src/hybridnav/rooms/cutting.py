@@ -142,7 +142,7 @@ def fine_segments(ground: Ground, directions: Directions | None = None) -> IntAr
     free = ground.free
     least = least_cells(_LEAST_M2, ground.resolution_m * ground.resolution_m)
     lines: IntArray = _cell_kernels.large_parts(free & ~_gaps(ground, directions), least)
-    spread(lines, free.view(np.int8) - np.int8(1), free.size)
+    spread(lines, free, free.size)
     taken = free & (lines < 0)
     if taken.any():  # gaps have taken all cells
         whole = _cell_kernels.large_parts(taken, least)
@@ -159,8 +159,11 @@ def spread(label_of: IntArray, region: AnyArray, most_steps: int) -> None:
     """Spread labels by steps along sides, each cell taking the nearest, in place.
 
     Steps go only between cells of one region, none into region -1, and at most `most_steps` from
-    where a label begins. `label_of`, `region`: int32 (rows, cols), the second int8 as well.
+    where a label begins. `label_of`: int32 (rows, cols); `region`: likewise, or bool, the cells of
+    one region.
     """
+    if region.dtype == np.bool_:
+        region = region.view(np.int8) - np.int8(1)
     to_label = (label_of < 0) & (region >= 0)
     beside = within_radius(to_label, radius_cells=1.0) & (label_of >= 0)
     first = np.flatnonzero(beside)

@@ -172,7 +172,7 @@ def reaching(label_of: IntArray, grid: OccupancyGrid) -> IntArray:
     reach = WALL_REACH_M / grid.resolution_m
     inside = label_of.copy()
     entered = (label_of >= 0) | (grid.measured == CellClass.UNEXPLORED)
-    spread(inside, entered.view(np.int8) - np.int8(1), int(reach))
+    spread(inside, entered, int(reach))
     return grown(label_of, reach, into=(inside, grid.measured == CellClass.OCCUPIED))
 
 

@@ -143,9 +143,8 @@ def kinds_of(
     """Return the kind of each room, None for one that is just a room.
 
     Holes of a room that hold no other one, and no free space to stand in, are filled first, for
-    furniture makes nothing narrow. The
-    breadth is that of the widest tenth of a room, since alcoves and crossings widen a corridor at a
-    few points.
+    furniture makes nothing narrow. The breadth is that of the widest tenth of a room, since alcoves
+    and crossings widen a corridor at a few points.
 
     `label_of`: int32 (rows, cols), the room of each cell, -1 for none; `is_free`: bool (rows,
     cols), free cells as measured; `resolution_m`: side of a cell in metres.
@@ -161,12 +160,12 @@ def kinds_of(
         cells = np.pad(label[window], 1, constant_values=-1)
         own = cells == number
         hole_of, _ = ndimage.label(ndimage.binary_fill_holes(own) & ~own)
-        space = np.pad(is_free[window], 1) & ~own
-        has_rooms = np.bincount(hole_of.ravel(), (cells >= 0).ravel()) > 0
-        has_rooms |= (
-            np.bincount(hole_of.ravel(), space.ravel()) * resolution_m**2 >= _LEAST_SPACE_M2
+        n_labelled, n_free = (
+            np.bincount(hole_of.ravel(), inner.ravel())
+            for inner in (cells >= 0, np.pad(is_free[window], 1))
         )
-        inside = own | (hole_of > 0) & ~has_rooms[hole_of]
+        is_filled = (n_labelled == 0) & (n_free * resolution_m**2 < _LEAST_SPACE_M2)
+        inside = own | (hole_of > 0) & is_filled[hole_of]
         depths_m = (clearance_cells(~inside)[inside]) * resolution_m
         area_m2 = np.count_nonzero(inside) * (resolution_m * resolution_m)
         broadest_m, breadth_m = 2 * depths_m.max(), 2 * float(np.quantile(depths_m, 0.9))

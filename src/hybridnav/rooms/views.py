@@ -83,7 +83,7 @@ def voted_rooms(
     free = kinds == Kind.INSIDE
     whole = frame_over(kinds.shape, 0.0, 1.0)
     room_of = _kernels.brought(_kernels.smoothed(joined.label_of, _ROUND), base, whole, free)
-    spread(room_of, free.view(np.int8) - np.int8(1), free.size)
+    spread(room_of, free, free.size)
     # What is small is small on the map itself.
     areas = np.zeros(joined.n_segments + 1, np.int64)
     for row in room_of:  # an array of all cells takes eight bytes more for each
@@ -96,7 +96,7 @@ def voted_rooms(
         row[:] = owner_of[row]
     # What hangs together in coarse cells alone, and what is too narrow for them.
     part_of: IntArray = _cell_kernels.large_parts(room_of, least, NO_ROOM)
-    spread(part_of, free.view(np.int8) - np.int8(1), free.size)
+    spread(part_of, free, free.size)
     left = free & (part_of < 0)
     part_of[left] = _cell_kernels.large_parts(left, 1)[left] + np.int32(part_of.max() + 1)
     return part_of
@@ -128,7 +128,7 @@ def _voted_segments(
         )
         merge(segments, rules(cell_m * cell_m))
         own = _kernels.brought(segments.label_of, frame, base, first.free)
-        spread(own, first.free.view(np.int8) - np.int8(1), _STEPS)
+        spread(own, first.free, _STEPS)
         labels.append(own)
     atoms = labels[0].copy()
     for own in labels:  # the first too: its numbers have gaps

@@ -90,12 +90,7 @@ def _read(path: PathLike, suffix: str, where: str) -> WaypointGraph | BuildingGr
     try:
         return _read_known(path, suffix, where)
     except MapError as error:
-        if isinstance(error, MapNotFoundError) or suffix in (
-            *_JSON,
-            *_XML,
-            *_TEXTS,
-            _GML,
-        ):
+        if isinstance(error, MapNotFoundError) or suffix in (*_JSON, *_XML, *_TEXTS, _GML):
             raise
         ending = printable(repr(suffix))[:20]
         raise MapError(f"{error}; unknown format {ending}, known are {_KNOWN}") from None
