@@ -109,7 +109,7 @@ plan().route  # imports
 sys.setprofile(see)
 plan().route
 sys.setprofile(None)
-print(json.dumps(sorted(name for name in files if "hybridnav" in Path(name).parts)))
+print(json.dumps(sorted(name for name in files if Path(name).is_relative_to(hn.__path__[0]))))
 """
 _LOADED = """
 import json, sys
