@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
@@ -23,6 +23,8 @@ def _rooms(walls: np.ndarray, label_of: np.ndarray, names: tuple[str, ...]) -> h
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10**6), st.floats(-1, 9), st.floats(-1, 11))
+@example(0, 8.0, 0.0)  # the side of a free cell at the end of the map
+@example(0, 3.0, 2.5)  # the side between a free cell and a wall
 def test_the_place_is_the_nearest_free_cell_of_the_room(seed: int, row: float, col: float) -> None:
     rng = np.random.default_rng(seed)
     walls = rng.random((8, 10)) < 0.3
@@ -42,7 +44,7 @@ def test_the_place_is_the_nearest_free_cell_of_the_room(seed: int, row: float, c
     found_row, found_col = FRAME.position_of(x, y)
     assert rooms.at((x, y)) == "a"
     if (x, y) == near:
-        assert not walls[int(row), int(col)]
+        assert not walls[FRAME.cell_of(x, y)]
     else:
         assert math.hypot(found_row - row, found_col - col) == pytest.approx(min(away), abs=1e-6)
 

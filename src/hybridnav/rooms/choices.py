@@ -59,11 +59,10 @@ def free_point(rooms: Rooms, name: str, near: Point | None = None) -> Point:
     best = parts[sizes == sizes.max()]
     cells = np.concatenate([rooms.level.receptive_field(int(part)) for part in best])
     point = rooms.point_of(name) if near is None else near
-    away = cells + 0.5 - grid.frame.positions_of(np.array([point]))[0]
-    nearest = int(np.argmin((away * away).sum(axis=1)))
-    if (np.abs(away[nearest]) <= 0.5).all():  # noqa: PLR2004 - half a cell
+    if (cells == grid.frame.cell_of(*point)).all(axis=1).any():
         return point
-    x, y = grid.frame.points_of(cells[nearest]).tolist()
+    away = cells + 0.5 - grid.frame.positions_of(np.array([point]))[0]
+    x, y = grid.frame.points_of(cells[int(np.argmin((away * away).sum(axis=1)))]).tolist()
     return x, y
 
 
