@@ -28,7 +28,7 @@ from tests.oracle.throats import labels_of, parts_of
 from tests.strategies import IS_FULL, MAX_SIDE, Scene, drawn, examples, occupancy_grid, scenes
 
 LINKAGES = ("radius", "survivor", "diameter", "throats")
-ORDINARY = settings(max_examples=examples(40, full=1000), deadline=None)
+ORDINARY = settings(max_examples=examples(40, full=100), deadline=None)
 ARRAYS = (
     "field_of",
     "cells",

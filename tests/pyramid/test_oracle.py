@@ -178,7 +178,7 @@ def test_collapsed_maps_have_the_arcs_of_their_boundaries(classes, arcs, loops):
 
 
 @given(class_grids(max_side=24 if IS_FULL else 14), st.randoms(use_true_random=False))
-@settings(max_examples=examples(40, full=3000), deadline=None)
+@settings(max_examples=examples(40, full=600), deadline=None)
 def test_rules_and_oracle_agree(classes, rng):
     base = Base.of(classes)
     plane = PlaneMap(classes)

@@ -15,7 +15,7 @@ from hybridnav.pyramid.start import parts_of
 from tests.oracle import throats as oracle
 from tests.strategies import MAX_SIDE, class_grids, examples, occupancy_grid
 
-ORDINARY = settings(max_examples=examples(60, full=1000), deadline=None)
+ORDINARY = settings(max_examples=examples(60, full=300), deadline=None)
 DISTANCES = st.sampled_from([1.0, 4.0, 8.0, 13.0, 20.0, 40.0, float("inf")])
 
 
