@@ -41,12 +41,10 @@ def test_the_place_is_the_nearest_free_cell_of_the_room(seed: int, row: float, c
         math.hypot(r + 0.5 - row, c + 0.5 - col) for r, c in here if sizes[joined[r, c]] == most
     ]
     x, y = free_point(rooms, "a", near)
-    found_row, found_col = FRAME.position_of(x, y)
     assert rooms.at((x, y)) == "a"
-    if (x, y) == near:
-        assert not walls[FRAME.cell_of(x, y)]
-    else:
-        assert math.hypot(found_row - row, found_col - col) == pytest.approx(min(away), abs=1e-6)
+    assert not walls[FRAME.cell_of(x, y)]
+    if (x, y) != near:
+        assert math.dist(FRAME.position_of(x, y), (row, col)) == pytest.approx(min(away), abs=1e-6)
 
 
 def test_a_room_that_the_robot_does_not_fit_in_is_refused() -> None:
