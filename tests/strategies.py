@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -39,6 +40,12 @@ def examples(count: int, full: int = 0) -> int:
 def tried(count: int, /, *strategies: Any, **by_name: Any) -> Any:
     """A test of random examples, as many as `examples` says."""
     return lambda test: settings(max_examples=examples(count))(given(*strategies, **by_name)(test))
+
+
+def full_but(often: Any, values: Any) -> list[Any]:
+    """Values of parameters, of which all but some are tried where every test runs only."""
+    rows = {v: v if isinstance(v, tuple) else (v,) for v in values}
+    return [v if v in often else pytest.param(*rows[v], marks=pytest.mark.full) for v in values]
 
 
 def drawn(*lines: str) -> Classes:

@@ -309,6 +309,7 @@ def office(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.full
 def test_a_profile_is_planned_and_what_it_forbids_is_told(cli: Any, office: Path) -> None:
     ends = "--from", "reception", "--to", "2.04"
     staff = cli("plan", office, *ends, "--profile", "staff")
@@ -343,6 +344,7 @@ def test_a_map_is_planned_under_a_profile(cli: Any, office: Path) -> None:
     assert plan["gap"] == 0
 
 
+@pytest.mark.full
 def test_out_of_order_lasts_until_it_is_opened(cli: Any, office: Path) -> None:
     lift = "link:north lift"
     assert cli("closed", office).out == "closed     0\n"
@@ -380,6 +382,7 @@ def test_out_of_order_lasts_until_it_is_opened(cli: Any, office: Path) -> None:
     assert cli("closed", office.with_name("none.yaml")).refuses(2, "there is no file")
 
 
+@pytest.mark.full
 def test_a_link_that_leads_one_way_goes_round_by_another(cli: Any, office: Path) -> None:
     text = office.read_text(encoding="utf-8")
     query = "plan", office, "--from", "office 5", "--to", "2.04"

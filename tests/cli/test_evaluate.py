@@ -108,6 +108,7 @@ def test_corner_cutting_is_a_counter_example(cli, tmp_path):
     assert "counter-examples" in done.err
 
 
+@pytest.mark.full
 def test_a_method_that_forks_has_one_record_a_pair(cli, rooms, tmp_path, monkeypatch):
     pairs = sample_pairs(load_map(rooms), 6, seed=0)
     monkeypatch.setenv(faulty.FATAL_PAIR, pairs[3].key.partition(":")[2])

@@ -173,6 +173,7 @@ def until(
     return judgements
 
 
+@pytest.mark.full
 def test_every_turn_behind_the_doors_of_the_office_is_told() -> None:
     assert LEAST_DEGREES == 40.0
     topology = found_rooms(OFFICE)

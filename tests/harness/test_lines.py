@@ -408,6 +408,7 @@ def ompl_processes_with(mark):
     return found
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs /proc")
 def test_ompl_through_evaluate_leaves_no_process(cli, tmp_path, monkeypatch):
     pytest.importorskip("ompl")

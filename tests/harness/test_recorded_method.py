@@ -68,6 +68,7 @@ def test_a_pair_that_was_not_recorded_has_no_answer(folder: Path, tmp_path: Path
     assert driven["any_angle_loss"].isna().all()
 
 
+@pytest.mark.full
 def test_paths_that_are_recorded_again_are_another_method(folder: Path, tmp_path: Path) -> None:
     frame = table(folder, tmp_path / "out")
     (folder / "1.csv").unlink()

@@ -141,6 +141,7 @@ def test_a_method_more_is_timed_with_the_others_again(settings, tmp_path):
     assert "weighted-astar were not taken beside" in (tmp_path / "run" / "summary.md").read_text()
 
 
+@pytest.mark.full
 def test_a_query_that_was_lost_is_not_asked_again(settings, tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", importable())
     pairs = sample_pairs(load_map(settings.maps[0]), N_PAIRS, seed=settings.seed)

@@ -14,7 +14,7 @@ from benchmarks.worlds import figure1_world, office_world
 from hybridnav.harness.scenes import sample_pairs
 from tests.certificates import Cell, built, check_pairs, check_plan, planners_of, random_pairs
 from tests.oracle.grid import components
-from tests.strategies import Scene
+from tests.strategies import Scene, full_but
 
 UNEXPLORED_TOO = "planner.allow_unexplored=true"
 
@@ -88,9 +88,7 @@ def reference_maps() -> list[Any]:
     names = [name for name, kind in rows if kind == "map"]
     games = (folder / "movingai").glob("**/*.map")
     names += sorted(file.relative_to(folder).as_posix() for file in games)
-    return [
-        pytest.param(name, marks=() if name in SOME_MAPS else pytest.mark.full) for name in names
-    ]
+    return full_but(SOME_MAPS, names)
 
 
 @pytest.mark.parametrize("name", reference_maps())

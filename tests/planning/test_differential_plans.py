@@ -13,9 +13,12 @@ from hybridnav.planning import load_preset
 from tests.oracle.long_robot import CORNERS, Walls
 from tests.oracle.long_robot import rooms as rooms_with_doors
 from tests.refine.test_differential import assert_turns_and_drives
+from tests.strategies import full_but
 
 pytest.importorskip("ompl")
 
+BACK = ("RRTConnect", "RRTstar", "InformedRRTstar", "PRM", "PRMstar")
+DRIVES = [("RRTConnect", False), ("BITstar", False), *((p, True) for p in BACK), ("RRT", False)]
 ROBOT = str([list(corner) for corner in CORNERS])
 
 
@@ -52,19 +55,7 @@ def rooms() -> hn.TopologicalMap:
     return hn.TopologicalMap(hn.DualGraphPyramid.build(rooms_with_doors()))
 
 
-@pytest.mark.parametrize(
-    ("planner", "reverses"),
-    [
-        ("RRTConnect", False),
-        ("BITstar", False),
-        ("RRTConnect", True),
-        ("RRTstar", True),
-        pytest.param("RRT", False, marks=pytest.mark.full),
-        pytest.param("InformedRRTstar", True, marks=pytest.mark.full),
-        pytest.param("PRM", True, marks=pytest.mark.full),
-        pytest.param("PRMstar", True, marks=pytest.mark.full),
-    ],
-)
+@pytest.mark.parametrize(("planner", "reverses"), full_but(DRIVES[:4], DRIVES))
 def test_every_planner_of_the_space_goes_through_doors_without_touching(rooms, planner, reverses):
     settings = f"planner={planner}", f"reverses={str(reverses).lower()}"
     start, goal = (2.0, 3.0, 0.5), (17.0, 9.0, 1.0)

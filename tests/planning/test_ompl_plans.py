@@ -20,11 +20,17 @@ from hybridnav.planning import load_preset
 from hybridnav.search.found import Query
 from tests.oracle.long_robot import CORNERS, Walls
 from tests.oracle.long_robot import rooms as rooms_with_doors
-from tests.strategies import drawn, occupancy_grid
+from tests.strategies import drawn, full_but, occupancy_grid
 
 pytest.importorskip("ompl")
 
 PLANNERS = ["RRTConnect", "RRTstar", "InformedRRTstar", "BITstar", "PRMstar"]
+CONFINED = [("RRTConnect", "chain"), ("BITstar", "chain"), ("BITstar", "mask"), ("PRMstar", "mask")]
+SPACES = [
+    *(("se2", planner) for planner in PLANNERS),
+    *(("dubins", planner) for planner in ("RRTConnect", "BITstar")),
+    *(("reeds-shepp", planner) for planner in PLANNERS if planner != "InformedRRTstar"),
+]
 ENDS = (1.0, 13.2), (40.6, 19.4)
 ROBOT = str([list(corner) for corner in CORNERS])
 
@@ -80,7 +86,7 @@ def test_every_planner_solves_the_office_near_the_optimum(planner_of: Any, name:
 
 @pytest.mark.parametrize(
     ("planner", "confine"),
-    [("RRTConnect", "chain"), ("BITstar", "chain"), ("BITstar", "mask"), ("PRMstar", "mask")],
+    full_but(CONFINED[:3], CONFINED),
 )
 def test_states_and_paths_stay_in_the_corridor(planner: str, confine: str) -> None:
     grid = field_of_pillars()
@@ -180,19 +186,7 @@ def test_closed_cells_are_gone_round(planner_of: Any) -> None:
 
 @pytest.mark.parametrize(
     ("space", "planner"),
-    [
-        ("se2", "RRTConnect"),
-        pytest.param("se2", "RRTstar", marks=pytest.mark.full),
-        pytest.param("se2", "InformedRRTstar", marks=pytest.mark.full),
-        pytest.param("se2", "BITstar", marks=pytest.mark.full),
-        ("se2", "PRMstar"),
-        pytest.param("dubins", "RRTConnect", marks=pytest.mark.full),
-        ("dubins", "BITstar"),
-        ("reeds-shepp", "RRTConnect"),
-        pytest.param("reeds-shepp", "RRTstar", marks=pytest.mark.full),
-        pytest.param("reeds-shepp", "BITstar", marks=pytest.mark.full),
-        pytest.param("reeds-shepp", "PRMstar", marks=pytest.mark.full),
-    ],
+    full_but([SPACES[i] for i in (0, 4, 6, 7)], SPACES),
 )
 def test_a_long_robot_goes_through_doors_without_touching(rooms, space, planner):
     made = long_robot(rooms, space, f"planner: {planner}, budget_s: 4")

@@ -231,6 +231,7 @@ def test_uses_that_are_none_are_refused(line: str, message: str, tmp_path: Path)
         hn.RoomLabels(("hall",), np.zeros((2, 4), dtype=int), uses={"attic": PRIVATE})
 
 
+@pytest.mark.full
 def test_no_route_of_a_visitor_leads_through_private_rooms_of_the_office() -> None:
     """Many shortest ways of the office lead through rooms of others, and none of a visitor."""
     grid = hn.load_map(OFFICE, robot_radius_m=0.25)

@@ -11,6 +11,7 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.ext.fleet import plot_building
+from tests.strategies import full_but
 
 ROOT = Path(__file__).parents[2]
 WIDTH = 240
@@ -48,11 +49,7 @@ def difference(one: Path, other: Path) -> float:
     return float(np.abs(first - second).mean()) if first.shape == second.shape else np.inf
 
 
-DRAWN = [
-    pytest.param(name, marks=[] if name in OFTEN else [pytest.mark.full])
-    for name in figures().PICTURES
-    if name != NEEDS_BROWSER
-]
+DRAWN = full_but(OFTEN, [name for name in figures().PICTURES if name != NEEDS_BROWSER])
 
 
 @pytest.mark.parametrize("name", DRAWN)

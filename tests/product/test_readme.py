@@ -19,9 +19,11 @@ from PIL import Image
 
 import hybridnav as hn
 from hybridnav.cli.app import run
+from tests.strategies import full_but
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", *sorted(str(p.relative_to(ROOT)) for p in (ROOT / "docs").rglob("*.md")))
+QUICK = [page for page in PAGES if page != "docs/gallery.md"]
 MAX_PICTURE_BYTES = 400_000
 
 SAVED = ("python ", "yaml ")
@@ -120,7 +122,7 @@ def _run_in_shell(text: str, folder: Path) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if _examples_of(page)])
+@pytest.mark.parametrize("page", full_but(QUICK, [page for page in PAGES if _examples_of(page)]))
 def test_a_page_shows_what_happens(page: str, folder: Path) -> None:
     names: dict[str, object] = {"__name__": "__main__"}
     for example in _examples_of(page):  # in order, in one folder, as a reader types them

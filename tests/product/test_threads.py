@@ -18,7 +18,7 @@ from hybridnav.harness.baselines.grid import GridAstar, GridDijkstra, WeightedAs
 from hybridnav.harness.baselines.regions import SimpleGraphPyramid
 from hybridnav.harness.judges import segment_faults
 from hybridnav.planning import load_preset
-from tests.strategies import occupancy_grid
+from tests.strategies import full_but, occupancy_grid
 
 N_THREADS = 4
 OVER_CELLS = [name for name in hn.preset_names() if name != "ompl"]
@@ -93,16 +93,12 @@ def test_four_threads_on_one_planner_get_the_answers_of_one(preset: str) -> None
     ]
     alone = [each() for each in jobs]
     assert sum(answer[0] is hn.PlanStatus.SOLVED for answer in alone) > len(jobs) / 2
-    planner = hn.HybridPlanner(
-        topology, preset=preset
-    )  # its caches are filled by whichever thread comes first
+    planner = hn.HybridPlanner(topology, preset=preset)  # whichever thread is first fills caches
     for answers in by_threads(jobs, repeats=4):
         assert answers == alone
 
 
-@pytest.mark.parametrize(
-    "name", [BY_OMPL[0], *(pytest.param(name, marks=pytest.mark.full) for name in BY_OMPL[1:])]
-)
+@pytest.mark.parametrize("name", full_but(BY_OMPL[:1], BY_OMPL))
 def test_four_threads_on_one_planner_with_ompl_get_paths_of_their_own(name: str) -> None:
     pytest.importorskip("ompl")
     grid = grid_with_rooms(seed=6, side=60)

@@ -18,7 +18,7 @@ from hybridnav.pyramid import DualGraphPyramid
 from hybridnav.refine.ompl import Search
 from hybridnav.search.mesh import build_mesh
 from hybridnav.viz import plot_kernels, plot_levels, plot_mesh, plot_search
-from tests.strategies import examples, occupancy_grid, scenes
+from tests.strategies import examples, full_but, occupancy_grid, scenes
 
 MAPS = Path(__file__).parents[2] / "maps"
 SOME = settings(max_examples=examples(4), deadline=None)
@@ -148,7 +148,7 @@ def test_levels_need_a_level_and_a_column(figure1):
         plot_levels(figure1, [99])
 
 
-@pytest.mark.parametrize("width", [3.0, pytest.param(7.0, marks=pytest.mark.full), 12.0])
+@pytest.mark.parametrize("width", full_but([3.0, 12.0], [3.0, 7.0, 12.0]))
 def test_titles_of_levels_do_not_collide(figure1, width):
     axes = plot_levels(figure1, columns=3, width_in=width)
     figure = axes[0].figure.figure

@@ -120,6 +120,7 @@ async def check_listed(editor: Any, reader: Any, tools: Any) -> None:
         assert tool.input_schema["type"] == "object"
 
 
+@pytest.mark.full
 def test_two_clients_errors_and_a_call_that_is_cancelled(tmp_path):
     floor = PaintedFloor(0)
     path = write_floor(floor, tmp_path)

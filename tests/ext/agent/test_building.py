@@ -368,6 +368,7 @@ def test_what_is_out_of_order_is_closed_for_programs_too(tmp_path):
     assert len(found["to_open"]) == 1
 
 
+@pytest.mark.full
 def test_a_client_asks_a_building(tmp_path):
     shutil.copytree(SHIPPED, tmp_path / "maps")
     file = tmp_path / "maps" / "building" / "building.yaml"

@@ -21,6 +21,7 @@ from tests.ext.fleet.scenes import (
     usable,
 )
 from tests.plans import PLAIN
+from tests.strategies import full_but
 
 SEEDS = st.integers(0, 10**6)
 
@@ -120,7 +121,7 @@ def test_cells(preset: str, seed: int) -> None:
             assert not plan.gap > 0
 
 
-@pytest.mark.parametrize("charged", [True, False])
+@pytest.mark.parametrize("charged", full_but([True], [True, False]))
 def test_hundreds_of_links(charged: bool) -> None:
     """The best of 300 links, also where rides cost nothing and floors have closed cells."""
     scene = random_building(11, preset="octile", most_floors=4, shape=(24, 28))

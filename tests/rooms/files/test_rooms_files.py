@@ -179,6 +179,7 @@ def test_a_thousand_rooms_that_are_written_are_read_again(tmp_path):
     assert (again.label_of == rooms.label_of).all()
 
 
+@pytest.mark.full
 def test_more_rooms_than_can_be_read_are_not_written(tmp_path):
     grid, rooms = blocks(88)
     with pytest.raises(hn.errors.RoomsError, match="7744 rooms take"):
