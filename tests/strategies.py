@@ -43,7 +43,7 @@ def tried(count: int, /, *strategies: Any, **by_name: Any) -> Any:
 
 
 def full_but(often: Any, values: Any) -> list[Any]:
-    """Values of parameters, of which all but some are tried where every test runs only."""
+    """Values of parameters, each but those in `often` marked `full`; tuples hold one a name."""
     rows = {v: v if isinstance(v, tuple) else (v,) for v in values}
     return [v if v in often else pytest.param(*rows[v], marks=pytest.mark.full) for v in values]
 

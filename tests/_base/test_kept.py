@@ -133,7 +133,6 @@ def called(folder: Path, dtype: str = "i8", factor: object = 2.0, before: str = 
     return answer, last.split()[0] == "True"
 
 
-@pytest.mark.full
 def test_kept_code_runs_without_numba_and_what_is_not_kept_with_it(tmp_path: Path) -> None:
     module = tmp_path / "of_kept.py"
     module.write_text(_KERNELS)
